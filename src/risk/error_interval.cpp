@@ -14,7 +14,7 @@
 namespace covary {
 namespace {
 
-/// Relative scatter at which the samples' estimate and the typical value count equally.
+/// Relative scatter at which the samples' estimate and the typical value have equal weight.
 constexpr double kTrusted = 0.5;
 /// Bounds of the error as multiples of the variance.
 constexpr double kLeastOverVariance = 0.5, kMostOverVariance = 30;
@@ -26,12 +26,7 @@ struct Ratio {
   double log = 0, hidden = 1;
 };
 
-/// R, but not much less than V.
-double risk_of(const RiskRow& s) {
-  return std::max(s.error + kMissingCovariance * s.covariance, kLeastOverVariance * s.variance);
-}
-
-/// R / V.
+/// log(R / V), shrunk by noise.
 Ratio ratio_of(const RiskRow& s) {
   const double least = risk_of(s);
   const double scatter = std::sqrt(std::max(0.0, s.squares - s.error * s.error / std::max(s.parts, 1.0))) / least;
@@ -51,11 +46,7 @@ void scale(Image& std_error, double factor) {
 /// Whether images of this kind with few groups have a separate fit.
 bool fitted_to_few(ErrorKind kind) { return kind == ErrorKind::kFilters || kind == ErrorKind::kNetwork; }
 
-bool is_mixture(ErrorKind kind, double groups) {
-  return kind != ErrorKind::kMean && kind != ErrorKind::kPair && groups >= kFewestGroups;
-}
-
-/// Which part of log(relMSE / V) is left to the features of an image: less, the closer a mixture is to the mean.
+/// Fraction of log(relMSE / V) explained by an image's features: less, the closer a mixture is to the mean.
 double not_the_mean(const RiskRow& sums, ErrorKind kind) {
   if (!is_mixture(kind, sums.groups)) return 1;
   return 1 - std::min(1.0, sums.variance / sums.noise);
@@ -101,7 +92,7 @@ LogError fitted_error(const RiskRow& sums, ErrorKind kind) {
 
 bool has_rare_light(const RiskRow& sums) {
   const double share = share_of_largest(sums);
-  return (share - 1 / sums.groups) / (1 - 1 / sums.groups) > kMostOfLargest;  // 0 if all groups hold equal parts
+  return (share - 1 / sums.groups) / (1 - 1 / sums.groups) > kMostOfLargest;  // 0 if all groups hold equal shares
 }
 
 std::string unknown_error(const RiskRow& sums, ErrorKind kind, const LogError& error) {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The error of an image and its bounds (ours). The samples give an estimate R with little bias and much noise
-// (image_risk.h); the variance V between halves is steady but blind to bias. Both, and signs of rare light, are
+// The error of an image and its bounds (ours). The samples give an estimate R with little bias but much noise
+// (image_risk.h); the variance V between halves is stable but blind to bias. Both, and indicators of rare light, are
 // features of a model fitted to renders of scenes with known truth (benchmarks/error_intervals):
 //
 //     log(relMSE / V) = p a . x + s r,   log s = b . x,
 //
-// r: the standardised residual, with quantiles from scenes left out of the fit; p: 1, for mixtures 1 - V / v, which is
-// 0 where they equal the mean h, whose error is V. No interval is given if few pixels or single groups hold most of the
-// noise or the light, if most of the noise is behind glass, or if the bounds are far apart.
+// r: the standardised residual, with quantiles from scenes left out of the fit; p: 1, but for mixtures 1 - V / v, which
+// is 0 if they equal the mean h, whose error is V. No interval is given if few pixels or single groups hold most of the
+// noise or light, or if the bounds are far apart.
 #pragma once
 
 #include <array>
@@ -26,8 +26,8 @@ inline constexpr int kErrorFeatures = 9;
 using ErrorFeatures = std::array<double, kErrorFeatures>;
 
 /// Features, from the sums of a whole image that has a variance: 1; log(R / V), shrunk towards 0 by noise, and the
-/// amount of shrinkage, 0 to 1; logs of the noise of h over V, of the noise, of the kurtosis between groups, of the
-/// number of pixels that hold the noise, of the light's fraction in the largest group of each pixel, and of the
+/// amount of shrinkage, 0 to 1; logarithms of the noise of h over V, of the noise, of the kurtosis between groups, of
+/// the number of pixels that hold the noise, of the fraction of light in the largest group of each pixel, and of the
 /// prediction by the standard error over V. R is the error of image_risk.h with 1.27 times its covariance, because a
 /// method smooths halves more than the whole (docs/notes/error-estimates.md).
 ErrorFeatures error_features(const RiskRow& sums);
@@ -37,11 +37,11 @@ struct LogError {
   double middle = 0, low = 0, high = 0;
 };
 /// Denoised means of fewer than kFewestGroups groups, such as two renders, have separate fits, because the kurtosis of
-/// few groups says little and v is noisier.
+/// few groups is uninformative and v is noisier.
 LogError fitted_error(const RiskRow& sums, ErrorKind kind);
 
-/// Whether the largest group of each pixel holds most of the light that is not common to all groups: single paths found
-/// it, and where they did says little of where others will.
+/// Whether the largest group of each pixel holds most of the light that is not common to all groups: it was found by
+/// single paths, whose positions say little about where others will find it.
 bool has_rare_light(const RiskRow& sums);
 
 /// Why no interval can be given; empty if one can.

@@ -33,7 +33,7 @@ inline constexpr FittedErrors kFittedErrors[] = {
      {0.2933, 0, 0.155, 0, 0, -0.00853, -0.27, -0.1054, 0},
      -2.198, -0.5455, -3.804, 0.9608},
 };
-/// Of denoised means of fewer groups than kFewestGroups: by filters, by a network.
+/// For denoised means of fewer than kFewestGroups groups: by filters, by a network.
 inline constexpr FittedErrors kFittedToFew[] = {
     {{-1.954, -0.4407, -0.7959, 0.3261, -0.09035, 0.3141, 0.1719, 0.3358, 0.3617},
      {1.281, 0, -1.412, 0, 0, -0.4169, -0.2926, -0.1884, 0},
@@ -44,10 +44,10 @@ inline constexpr FittedErrors kFittedToFew[] = {
 };
 // clang-format on
 
-/// There is no interval where the largest group of each pixel has a larger share of the light that is not common to all
-/// groups, the bounds are further off than this factor, a larger share of the noise is in mirrors or behind glass,
-/// fewer pixels hold the noise, or there are fewer groups and the kind has no fit for few.
-inline constexpr double kMostOfLargest = 0.55, kMostFactor = 5, kMostSpecular = 0.5;
+/// There is no interval if the largest group of each pixel has a larger fraction of the light that is not common to all
+/// groups, if the bounds are wider than this factor, if fewer pixels hold the noise, or if there are fewer groups and
+/// the kind has no separate fit for few groups.
+inline constexpr double kMostOfLargest = 0.55, kMostFactor = 5;
 inline constexpr int kFewestPixels = 20, kFewestGroups = 8;
 
 }  // namespace covary

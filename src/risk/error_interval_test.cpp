@@ -15,7 +15,7 @@
 namespace covary {
 namespace {
 
-/// Sums of an image of which much is known.
+/// Sums of an image about which much is known.
 RiskRow known_sums() {
   RiskRow s;
   s.values = 30000, s.parts = 625, s.groups = 12;
@@ -54,7 +54,7 @@ TEST(ErrorInterval, IsAroundThePredictedError) {
   }
 }
 
-/// log(relMSE) by the formulas of the page, step by step.
+/// log(relMSE) by the documented formulas, step by step.
 double middle_by_hand(const RiskRow& s, const ErrorFeatures& a, double part = 1) {
   const double risk = s.error + 0.27 * s.covariance;
   const double scatter = std::sqrt(s.squares - s.error * s.error / s.parts) / risk,
@@ -93,7 +93,7 @@ TEST(ErrorInterval, IsNotGivenWithFewGroups) {
 TEST(ErrorInterval, OfDenoisedMeansOfFewGroupsHasAFitOfItsOwn) {
   RiskRow sums = known_sums();
   sums.groups = 2;
-  sums.light_of_largest = 0.7 * sums.light;  // of two groups at least half
+  sums.light_of_largest = 0.7 * sums.light;  // at least half, with two groups
   EXPECT_NEAR(fitted_error(sums, ErrorKind::kFilters).middle, middle_by_hand(sums, kFittedToFew[0].middle), 1e-12);
   EXPECT_NEAR(fitted_error(sums, ErrorKind::kNetwork).middle, middle_by_hand(sums, kFittedToFew[1].middle), 1e-12);
   EXPECT_EQ(unknown_error(sums, ErrorKind::kNetwork, {0, -0.5, 0.5}), "");
@@ -191,7 +191,7 @@ TEST(ErrorInterval, IsNotReliableBeyondAFactorOfOneAndAHalf) {
 TEST(ErrorInterval, HasFeaturesThatDoNotChangeWithBrightnessOrSize) {
   RiskRow large = known_sums();
   for (const auto& [name, sum] : kRiskSums)
-    if (sum != &RiskRow::groups) large.*sum *= 4;  // as many rows again, three times
+    if (sum != &RiskRow::groups) large.*sum *= 4;  // four times as many rows
   const ErrorFeatures a = error_features(known_sums()), b = error_features(large);
   for (const size_t i : {0, 3, 4, 5, 7, 8}) EXPECT_NEAR(a[i], b[i], 1e-12) << i;
   EXPECT_LT(b[2], a[2]) << "more pixels hide less";

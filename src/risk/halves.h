@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every second group of an image: half of its samples, independent of the other half, so that one can judge what was
-// made of the other.
+// made from the other.
 #pragma once
 
 #include <cstdint>

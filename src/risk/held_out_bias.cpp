@@ -13,18 +13,18 @@ namespace {
 
 using namespace lanes;
 
-constexpr int kRadii[] = {3, 7};       // of the windows in cells, the narrow one first
-constexpr int kBorder = 7;             // the largest radius
-constexpr float kBandwidth = 0.5f;     // of the target's brightness
-constexpr float kLeastSquare = 1e-4f;  // of the bandwidth
+constexpr int kRadii[] = {3, 7};       // radii in cells, the narrow window first
+constexpr int kBorder = 7;             // largest radius
+constexpr float kBandwidth = 0.5f;     // relative to the target's brightness
+constexpr float kLeastSquare = 1e-4f;  // minimum squared bandwidth
 constexpr float kSignificant = 3;      // standard errors
 constexpr float kFewestCells = 20;     // similar cells: fewer determine their noise too poorly
 constexpr float kPixels = kBiasCell * kBiasCell;
-constexpr float kLeastRelative = 1e-4f;  // of the brightness: less is rounding
+constexpr float kLeastRelative = 1e-4f;  // relative to the brightness: smaller values are rounding errors
 static_assert(kBiasReach >= (kBorder + 1) * kBiasCell);
 
-/// Planes of cells: guides of both halves (kFar where no pixel is valid), sums of M - h of both, half of the square of
-/// their difference, the same with the weight of relMSE, valid pixels.
+/// Planes of cells: guides of both halves (kFar where no pixel is valid), sums of M - h for both, half the square of
+/// their difference, the same with the weight of relMSE, number of valid pixels.
 constexpr int kGuide = 0, kResidual = 6, kSquare = 12, kRelative = 15, kCount = 18, kPlanes = 19;
 
 /// Sums over the pixels of one cell.
@@ -83,7 +83,7 @@ Planes cells_of(const HeldOutBiasInput& in) {
 /// d and v of one half at the cells (x + lane, y).
 struct GuidedMean {
   vfloat mean[3] = {}, variance[3] = {};
-  vfloat cells = {};  ///< as informative as this many of equal weights
+  vfloat cells = {};  ///< effective number of cells
 };
 
 GuidedMean guided_mean(const Planes& cells, int half, int radius, int x, int y) {
@@ -116,7 +116,7 @@ GuidedMean guided_mean(const Planes& cells, int half, int radius, int x, int y) 
   return sums;
 }
 
-/// The bias according to both halves' means, zero where it is not significant.
+/// The bias from both halves' means, zero if not significant.
 vfloat significant(const GuidedMean& of_a, const GuidedMean& of_b, int c, vfloat brightness) {
   const vfloat a = of_a.mean[c], b = of_b.mean[c], variance = 0.25f * (of_a.variance[c] + of_b.variance[c]);
   const vfloat bias = 0.5f * (a + b), square = bias * bias, difference = a - b, least = kLeastRelative * brightness;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A planted bias is found with its sign and size; without one there is none. 8 pictures of 600 cells with 3 values
-// each, 15 times as many as are independent of each other for wide windows, give a rate of false alarms of 0.3 %.
-// Without the demand for 20 cells, and with the noise of the cells alone, it was 1.1 %.
+// A planted bias is found with its sign and size; without one, none is found. 8 images of 600 cells with 3 values each,
+// 15 times as many as are independent for wide windows, give a false-alarm rate of 0.3 %. Without requiring 20 cells,
+// and with only the noise of the cells, it was 1.1 %.
 #include "risk/held_out_bias.h"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ namespace {
 
 constexpr int kWidth = 120, kHeight = 80;
 
-/// What is added to the picture at a pixel.
+/// Added to the image at a pixel.
 using Bias = std::function<float(int x, int y)>;
 
 Image picture(uint64_t seed, float noise, const Bias& bias) {
@@ -43,7 +43,7 @@ Moments moments_of(const Image& image) {
   return m;
 }
 
-/// Bias that is found in images with this one, and noise of a fifth of that of the independent images.
+/// Bias found in images with this bias and noise of a fifth of that of the independent images.
 Image found(uint64_t seed, const Bias& bias) {
   const auto none = [](int, int) { return 0.0f; };
   const Image m[2] = {picture(10 * seed, 0.1f, bias), picture(10 * seed + 1, 0.1f, bias)};
@@ -114,7 +114,7 @@ TEST(HeldOutBias, IsToldByEstimatorsAndDoesNotDependOnThreads) {
   EXPECT_TRUE(make_estimator("iicv").apply(crn.view(), independent.view(), settings).bias.data.empty());
 }
 
-/// `iicv` with something done to its image.
+/// `iicv` with a modified image.
 Estimator damaged(const std::function<Image(const Image&)>& damage) {
   Estimator estimator = make_estimator("iicv");
   const auto apply = estimator.apply;
@@ -135,7 +135,7 @@ Image bias_of(const Estimator& estimator) {
 }
 
 TEST(HeldOutBias, ShowsAShiftedAndABlurredImage) {
-  // Up to x + y = 45 the picture is bright, beyond it has 0.3 of that.
+  // Up to x + y = 45 the image is bright, and beyond 0.3 times as bright.
   const Image shifted = bias_of(damaged([](const Image& image) {
     Image result = image;
     for (int y = 0; y < kHeight; ++y)
@@ -154,7 +154,7 @@ TEST(HeldOutBias, ShowsAShiftedAndABlurredImage) {
         }
     return result;
   }));
-  // Before the edge too dark, behind it too bright.
+  // Too dark before the edge, too bright behind it.
   EXPECT_LT(mean_in(blurred, 28, 34, 2, 8), -0.05);
   EXPECT_GT(mean_in(blurred, 44, 52, 2, 8), 0.05);
 }

@@ -17,11 +17,11 @@ namespace {
 
 using namespace lanes;
 
-/// Pixels of a part of a row, whose errors are summed.
+/// Pixels of a row segment whose errors are summed.
 constexpr int kPart = 16;
 /// Relative standard error of the held-out error at which it counts as much as the estimator's own prediction.
 constexpr double kTrusted = 0.3;
-/// Least error of the whole over the variance of the halves: half, except for noise.
+/// Minimum error of the whole over the variance of the halves: one half, less a margin for noise.
 constexpr double kLeastOverVariance = 0.25;
 
 HeldOutRow sum_of(const std::vector<HeldOutRow>& rows) {
@@ -72,7 +72,7 @@ HeldOutRow row_of_halves(const HeldOutInput& in, int width, int y, const Weights
   return row;
 }
 
-/// Of all rows, with the guide's weights.
+/// Over all rows, with the guide's weights.
 HeldOutRow sum_of_halves(const HeldOutInput& in) {
   std::vector<HeldOutRow> rows(static_cast<size_t>(in.guide->height));
   parallel_for(in.guide->height, 8, [&](int y) {
@@ -92,7 +92,8 @@ double factor_of_image(const HeldOutInput& in) {
   return 2 * usual * std::pow(error_of_whole(all) / (usual * all.variance), trust);
 }
 
-/// Makes the relative squared error of each pixel proportional to `disagreement`; the whole image's is unchanged.
+/// Makes the relative squared error of each pixel proportional to `disagreement`; the total over the image is
+/// unchanged.
 void place(const Image& disagreement, const HeldOutInput& in, Image& std_error) {
   if (std::none_of(disagreement.data.begin(), disagreement.data.end(), [](float d) { return d > 0; })) return;
   const int width = std_error.width;
@@ -116,7 +117,7 @@ void place(const Image& disagreement, const HeldOutInput& in, Image& std_error) 
   for (float& value : std_error.data) value *= static_cast<float>(std::sqrt(before / after));
 }
 
-/// Each squared error is weighted by the image it belongs to: independent of the held-out samples.
+/// Each squared error is weighted by the image it belongs to, which is independent of the held-out samples.
 HeldOutRow held_out_row(const HeldOutInput& in, const EstimatorResult& whole, int y) {
   const int width = whole.estimate.width;
   HeldOutRow row = row_of_halves(in, width, y, [&](int x) {
@@ -165,7 +166,7 @@ EstimatorResult apply_with_rows(const Estimator& base, const GroupedImage& crn, 
 Estimator with_held_out_rows(const Estimator& base) {
   if (!base.holds_out || base.adaptive) return base;
   Estimator estimator = base;
-  // The images and moments of both halves, the moments of all, and half of the groups of both images.
+  // The images and moments of both halves, the moments of all samples, and half of the groups of both images.
   estimator.memory.of_halves = (2 * (3 + 6) + 6) * sizeof(float);
   estimator.memory.of_halves_per_group = 3 * sizeof(float);
   estimator.memory.groups_for_halves = 2 * base.fewest_groups;

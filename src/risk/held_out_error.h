@@ -5,9 +5,10 @@
 //     (M_A - h_B)^2 - var h_B   is the squared error of M_A, bias included,
 //     (M_A - M_B)^2 / 2         is its variance alone.
 //
-// The second has little noise and shows where the error is: its mean over similar pixels (guided_cells.h) is the
-// error's shape. The first, over the whole image, shows how large it is: with squared bias e - v of a half, that of the
-// whole is e - v + v / 2. Where light is rare, e is noise, and the typical ratio of error to v is used instead.
+// The second has little noise and shows where the error is: its mean over similar pixels (guided_cells.h) gives the
+// error's spatial distribution. The first, over the whole image, shows its size: with the squared bias e - v of a half,
+// the error of the whole is e - v + v / 2. If light is rare, e is mostly noise, and the typical ratio of error to v is
+// used instead.
 #pragma once
 
 #include <array>
@@ -22,31 +23,31 @@ struct HeldOutInput {
   std::array<const Image*, 2> halves = {};            ///< M_A, M_B
   std::array<const Moments*, 2> independent = {};     ///< h_A, h_B and the variances of their pixels
   const Image* guide = nullptr;                       ///< G of guided_cells.h
-  const std::vector<unsigned char>* valid = nullptr;  ///< pixels with 0 are left out and have no error
+  const std::vector<unsigned char>* valid = nullptr;  ///< pixels with 0 are ignored and have no error
   double error_over_variance = 0.5;                   ///< typical ratio of the whole's error to v; 1/2 without bias
-  /// Relative squared differences of the whole image from others made differently of the same samples, one channel;
-  /// null: there are none. Only used by held_out_error().
+  /// Relative squared differences of the whole image from others made differently from the same samples, one channel;
+  /// null: none. Only used by held_out_error().
   const Image* disagreement = nullptr;
 };
 
-/// The estimated standard error of an image that the same method made of both halves. These determine its size; its
-/// place follows the disagreement, if given, because halves have their bias in common (docs/notes/error-estimates.md).
-/// Bit-identical for any number of threads.
+/// The estimated standard error of an image that the same method made from both halves. These determine its size; its
+/// spatial distribution follows the disagreement, if given, because halves share their bias
+/// (docs/notes/error-estimates.md). Bit-identical for any number of threads.
 Image held_out_error(const HeldOutInput& input);
 
-/// Errors of the halves' images, as means over the values, each over G'^2 + 0.01.
+/// Errors of the halves' images, as means over values, each divided by G'^2 + 0.01.
 struct HalvesRisk {
-  double error = 0;     ///< squared error of a half's image, including bias; may be negative, because it is noisy
+  double error = 0;     ///< squared error of a half's image, including bias; noisy, so it may be negative
   double variance = 0;  ///< of a half's image
   /// Of the image of all samples: the bias of a half, and half of its variance.
   double of_whole() const { return error - 0.5 * variance; }
 };
-/// With the guide. Differences between images of the same halves have less noise than the errors, because the held-out
-/// samples are the same.
+/// With the weights of the guide. Differences between images of the same halves are less noisy than the errors, because
+/// the held-out samples are the same.
 HalvesRisk risk_of_halves(const HeldOutInput& input);
 
 /// An estimator that also fills EstimatorResult::held_out and risk_rows if both halves have enough groups; only for
-/// those with Estimator::holds_out, others are returned unchanged.
+/// estimators with Estimator::holds_out, others are returned unchanged.
 Estimator with_held_out_rows(const Estimator& base);
 
 /// Scales the standard error so that its relMSE lies between the estimator's prediction and the held-out estimate: with

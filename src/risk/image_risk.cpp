@@ -10,7 +10,7 @@
 namespace covary {
 namespace {
 
-/// Pixels of a part of a row, whose errors are summed.
+/// Pixels of a row segment whose errors are summed.
 constexpr int kPart = 16;
 /// Albedos or normals of one surface differ by no more, as sums over channels.
 constexpr float kSameSurface = 0.05f;
@@ -25,7 +25,7 @@ PixelRisk risk_at(const ImageRiskInput& in, int x, int y) {
   for (int c = 0; c < 3; ++c) {
     const double h = in.independent->mean.row(c, y)[x], v = in.independent->variance_of_mean.row(c, y)[x];
     pixel.noise += v;
-    if (!in.halves[0]) {  // M is h: its error is its variance, and nothing needs to be added
+    if (!in.halves[0]) {  // M is h: its error is its variance, and no correction is needed
       pixel.error += v, pixel.variance += v;
       continue;
     }
@@ -42,17 +42,7 @@ PixelRisk risk_at(const ImageRiskInput& in, int x, int y) {
   return pixel;
 }
 
-/// Whether the surface behind mirrors and glass is not the first one.
-bool is_specular(const Guides& surfaces, int x, int y) {
-  const auto differ = [&](const Image* first, const Image* behind) {
-    if (!first || !behind) return false;
-    const float *a = first->pixel(x, y), *b = behind->pixel(x, y);
-    return std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]) > kSameSurface;
-  };
-  return differ(surfaces.normal, surfaces.denoising_normal) || differ(surfaces.albedo, surfaces.denoising_albedo);
-}
-
-/// The fractions of light in a pixel's groups, and how much they differ.
+/// The fraction of light in the largest of a pixel's groups, and the variation between groups.
 void add_groups(const ImageRiskInput& in, int x, int y, double weight, RiskRow& row) {
   const GroupedImage& image = *in.groups;
   const int T = image.groups;
@@ -100,7 +90,7 @@ RiskRow risk_of_row(const ImageRiskInput& in, int y) {
 }
 
 /// The mean brightness of the surrounding 5 x 5 pixels without the pixel itself: a pixel that is bright by chance would
-/// hide its own error, and a median is too dark where light is rarely found.
+/// hide its own error, and a median is too dark where light is found rarely.
 Image brightness_around(const Image& image) {
   constexpr int kRadius = 2;
   Image guide(image.width, image.height, 3);

@@ -8,10 +8,10 @@
 //
 //     cov(M, h) = E[ (M_A - M_B) (h_A - h_B) ] / 4,   and likewise   var M = E (M_A - M_B)^2 / 4.
 //
-// Where both halves chose the weights, as in mixtures, each half follows the other's samples, so the covariance and
-// with it the estimate are too small under strong noise. The noise of the estimate is mostly that of h, about sqrt(2) v
-// per value, so it is only useful over many pixels. Further sums measure how noisy it is: error_interval.h derives an
-// error and its interval from all of them.
+// If both halves determined the weights, as in mixtures, each half depends on the other's samples, so that the
+// covariance, and with it the estimate, is too small under strong noise. The noise of the estimate is mostly that of h,
+// about sqrt(2) v per value, so it is only useful over many pixels. Further sums measure how noisy it is:
+// error_interval.h derives an error and its interval from all of them.
 #pragma once
 
 #include <array>
@@ -33,8 +33,8 @@ struct ImageRiskInput {
   Guides surfaces = {};  ///< tell mirrors and glass, where the surfaces behind them are known, too
 };
 
-/// Sums over each row of the image. Rows do not depend on each other, so those of bands can be joined. Bit-identical
-/// for any number of threads.
+/// Sums over each row of the image. Rows are independent, so those of bands can be joined. Bit-identical for any number
+/// of threads.
 std::vector<RiskRow> image_risk(const ImageRiskInput& input);
 
 /// Sets the rows and kind of `mean`, the mean of these groups with their standard error; does nothing if pixels have

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The squared error of an image by its own samples, against the truth of synthetic images.
+// The squared error of an image estimated from its own samples, against the truth of synthetic images.
 #include "risk/image_risk.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ constexpr int kWidth = 64, kHeight = 48, kGroups = 12, kRuns = 24;
 
 double truth_at(int x, int y) { return 1 + 0.5 * std::sin(0.15 * x) * std::cos(0.2 * y) + (x > 40 ? 0.7 : 0); }
 
-/// Groups around the truth, with errors of mean zero that are skewed: 0.8 times an exponential number less its mean.
+/// Groups around the truth, with skewed errors of mean zero: 0.8 times a centred exponential variable.
 struct Samples {
   std::vector<float> data;
   GroupedImage image{kWidth, kHeight, kGroups};
@@ -37,7 +37,7 @@ struct Samples {
   }
 };
 
-/// A filter with much bias: the mean of 5 x 5 pixels, 0.9 times as bright.
+/// A filter with strong bias: the mean of 5 x 5 pixels, times 0.9.
 Image filtered(const GroupedImage& groups) {
   const Image mean = mean_of_groups(groups).estimate;
   Image result(kWidth, kHeight, 3);
@@ -73,8 +73,8 @@ RiskRow sums_of(const Samples& samples, double& true_error) {
       image_risk({&image, {&halves[0], &halves[1]}, &mean, {&mean_a, &mean_b}, &samples.image, &guide, &valid}));
 }
 
-// 24 images; the mean of estimate - truth over its standard error is Student's t of 23 degrees of freedom: |t| > 5.6
-// has a probability of 1e-5. Without the covariance the estimate is too small by 2 v / 25 per value, which is t = -20.
+// 24 images; the mean of estimate - truth over its standard error is Student's t with 23 degrees of freedom: |t| > 5.6
+// has probability 1e-5. Without the covariance, the estimate is too small by 2 v / 25 per value, which gives t = -20.
 TEST(ImageRisk, IsTheSquaredErrorOfAFilteredImageWithItsBias) {
   double sum = 0, squares = 0, truth = 0;
   for (uint32_t run = 0; run < kRuns; ++run) {
@@ -96,32 +96,13 @@ TEST(ImageRisk, KnowsItsOwnScatter) {
     told += sums.squares - sums.error * sums.error / sums.parts;
   }
   const double variance = (squares - sum * sum / kRuns) / (kRuns - 1);
-  // Bias differs from part to part, so that too much is told; a chi-square of 23 degrees of freedom adds ± 0.3.
+  // Bias differs between segments, so that the estimate is too large; a chi-square with 23 degrees of freedom adds ±
+  // 0.3.
   EXPECT_GT(told / kRuns, 0.5 * variance);
   EXPECT_LT(told / kRuns, 5 * variance);
 }
 
-/// A wall of which the left quarter is a mirror and the next one a pane of glass: that shows other normals, this other
-/// albedos. Without images of what is behind them nothing is known.
-TEST(ImageRisk, TellsTheNoiseInMirrorsAndBehindGlass) {
-  const Samples samples(7);
-  const Image guide = white(), albedo = white();
-  Image normal = white(), behind_mirror = white(), behind_glass = white();
-  for (int y = 0; y < kHeight; ++y)
-    for (int x = 0; x < kWidth / 4; ++x) *behind_mirror.pixel(x, y) = -1, *behind_glass.pixel(x + kWidth / 4, y) = 0.9f;
-  const std::vector<unsigned char> valid(static_cast<size_t>(kWidth) * kHeight, 1);
-  const Moments mean = moments(samples.image, valid, 0, 0.0f);
-  const auto specular = [&](const Guides& surfaces) {
-    const RiskRow sums = sum_of(image_risk({&guide, {}, &mean, {}, &samples.image, &guide, &valid, surfaces}));
-    return sums.specular_noise / sums.noise;
-  };
-  EXPECT_NEAR(specular({&albedo, &normal, &behind_glass, &behind_mirror}), 0.5, 0.05);
-  EXPECT_NEAR(specular({&albedo, nullptr, &behind_glass, nullptr}), 0.25, 0.05);
-  EXPECT_EQ(specular({&albedo, &normal, nullptr, nullptr}), 0);
-  EXPECT_EQ(specular({}), 0);
-}
-
-/// Of the mean itself.
+/// For the mean itself.
 std::vector<RiskRow> risk_of_mean(const GroupedImage& groups) {
   EstimatorResult mean = mean_of_groups(groups);
   add_risk_of_mean(groups, mean);

@@ -19,7 +19,7 @@ namespace {
 constexpr int kBlock = 16;
 constexpr double kShareOfBlocks = 0.95;
 
-/// Of doubt_of(). With fewer pixels than kFewestPixels, 1 % of them is too few to judge.
+/// Limits of doubt_of(). In an image with fewer than kFewestPixels pixels, 1 % of them is too few to judge.
 constexpr double kFewPixels = 0.01, kMostInFewPixels = 0.4, kMostUncertainty = 0.5, kMostDisagreement = 4;
 constexpr size_t kFewestPixels = 400;
 
@@ -54,7 +54,7 @@ PartSum sum_over(const EstimatorResult& result, int x0, int y0, int x1, int y1) 
   return part;
 }
 
-/// Fraction of the predicted error in the kFewPixels of all pixels that have most of it.
+/// Fraction of the predicted error in the fraction kFewPixels of all pixels that has the most.
 double share_of_few(const EstimatorResult& result) {
   std::vector<double> errors;
   for (int y = 0; y < result.estimate.height; ++y)

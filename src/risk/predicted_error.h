@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The error of the whole image that an estimator's own error estimate predicts.
+// The error of the whole image predicted by an estimator's own error estimate.
 #pragma once
 
 #include <cstdint>
@@ -13,10 +13,10 @@ namespace covary {
 
 /// relMSE predicted by the standard errors of `result`, with the estimate in place of the reference:
 ///     1 / (3N) sum ||StdError||^2 / (F'^2 + 0.01),   F': mean of the pixel's three values.
-/// Leaves out pixels that are not finite. Throws Error(kUsage) if `result` has no standard error.
+/// Ignores non-finite pixels. Throws Error(kUsage) if `result` has no standard error.
 double predicted_relmse(const EstimatorResult& result);
 
-/// The same per block of 16 x 16 pixels (smaller at the right and lower edges): the 95 % quantile over blocks, which
+/// Same per block of 16 x 16 pixels (smaller at the right and lower edges): the 95 % quantile over blocks, which
 /// describes the worst regions.
 double predicted_blocks(const EstimatorResult& result);
 
@@ -28,7 +28,7 @@ struct PredictedBounds {
 /// The predicted relMSE of an image.
 struct PredictedError {
   double relmse = 0;                      ///< predicted_relmse(), or the middle of the interval
-  std::optional<PredictedBounds> bounds;  ///< around it; empty if none can be given (EstimatorResult::interval)
+  std::optional<PredictedBounds> bounds;  ///< around it; empty if unknown (EstimatorResult::interval)
   /// Why it is unreliable; empty if it is reliable. With an interval: it is wider than kReliableFactor of
   /// error_interval.h, or cannot be given. Otherwise: there are few samples per pixel; or 1 % of the pixels hold more
   /// than 40 % of the error; or held-out samples determine it no better than to half of itself, or give more than four

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The predicted error of an image, by hand.
+// The predicted error of an image, checked by hand.
 #include "risk/predicted_error.h"
 
 #include <gtest/gtest.h>
@@ -19,12 +19,12 @@ TEST(PredictedError, IsTheMeanOfRelativeSquares) {
   result.std_error = Image(3, 1, 3);
   result.estimate.data = {1, 2, 3, 0, 0, 0, 1, 1, 1};
   result.std_error.data = {0.1f, 0.2f, 0.3f, 0.1f, 0, 0, std::numeric_limits<float>::quiet_NaN(), 0, 0};
-  // The third pixel is not finite and does not count.
+  // The third pixel is not finite and is ignored.
   const double first = (0.01 + 0.04 + 0.09) / 3 / (4 + 0.01), second = 0.01 / 3 / 0.01;
   EXPECT_NEAR(predicted_relmse(result), (first + second) / 2, 1e-7);
 }
 
-/// 4 x 5 blocks, the last ones smaller, of which block i has the error i.
+/// 4 x 5 blocks, the last ones smaller, where block i has error i.
 TEST(PredictedError, OfBlocksIsTheirPercentile) {
   EstimatorResult result;
   result.estimate = Image(60, 70, 3);
