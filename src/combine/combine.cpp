@@ -21,7 +21,7 @@
 namespace covary {
 namespace {
 
-constexpr int kLightRows = 64;  // of the light film in memory at a time
+constexpr int kLightRows = 64;  // rows of the light film in memory at a time
 constexpr int kFewestRows = 16;
 constexpr double kImagesOfLayer = 12;
 
@@ -36,7 +36,7 @@ void throw_errors(const InputFindings& inputs) {
     throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors);
 }
 
-/// Copies the n rows of `part` from its row `skipped` on into `whole`, from row y on.
+/// Copies n rows of `part`, starting at its row `skipped`, to rows y … y + n - 1 of `whole`.
 void append(const EstimatorResult& part, int skipped, int y, int n, int height, EstimatorResult& whole) {
   const auto copy = [&](const Image& from, Image& to) {
     if (from.data.empty()) return;
@@ -65,7 +65,7 @@ void check_memory(const CombineRequest& request, double planned) {
                                       : memory_limit_text()));
 }
 
-/// The light film's error is its variance alone and is added to every image. `before`: predicted without it.
+/// The light film's error is its variance alone and is added to every image. `before`: the error predicted without it.
 void add_risk_of_light(double before, EstimatorResult& result) {
   if (!result.risks) return;
   const double after = predicted_relmse(result);
@@ -73,10 +73,10 @@ void add_risk_of_light(double before, EstimatorResult& result) {
   for (MeasuredRisks::OfImage& image : result.risks->images) image.relmse += after - before;
 }
 
-/// Bytes per pixel of a layer while it is denoised: its groups, copies of them, and its images.
+/// Bytes per pixel of a layer during denoising: its groups, copies of them, and its images.
 double layer_bytes(int groups) { return 3 * sizeof(float) * (2.0 * groups + kImagesOfLayer); }
 
-/// For the whole image with all layers.
+/// Estimates the whole image with all layers.
 EstimatorResult estimate_layers(const CombineRequest& request, std::map<std::string, Image>& layers) {
   if (!request.estimator.splits_layers)
     throw Error(ErrorCode::kUsage,
@@ -141,7 +141,7 @@ double planned_memory(const CombineRequest& request) {
 }
 
 Band band_around(const CombineRequest& request, int first, int last) {
-  // Starts at a multiple of a cell of the residual correction.
+  // Start at a multiple of the cells of the residual correction.
   const int begin = std::max(0, first - request.estimator.reach) / kResidualCell * kResidualCell;
   const int n = std::min(request.independent.height, last + request.estimator.reach) - begin;
   return {rows_of(request.crn, begin, n), request.independent.rows(begin, n), begin};
@@ -154,7 +154,7 @@ InputFindings examine(const CombineRequest& request) {
   if (request.crn) check_origins(crn_origin, independent.origin, inputs.findings);
   check_light(crn_origin, independent.origin, request.light ? &request.light->origin : nullptr, inputs.findings);
   InputChecks checks(independent.width, independent.height, request.crn ? request.crn->groups : 0, independent.groups);
-  // Only for other renderers' images: covary's films say how they were made.
+  // Only for images of other renderers: covary's films say how they were made.
   const bool by_others = !request.crn && independent.origin.sampling.empty();
   DifferenceChecks differences(independent.width, independent.height, by_others ? independent.groups : 0);
   const int step = std::max(kFewestRows, rows_in_memory(request));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Combines two grouped images, or denoises an independent one: check the inputs, estimate, calibrate the error, add the
-// light film. The one pipeline of `covary combine`, Python and C++; renders end with its last two steps.
+// Combines two grouped images, or denoises an independent one: checks the inputs, estimates, calibrates the error, adds
+// the light film. The one pipeline of `covary combine`, Python and C++; renders end with its last two steps.
 #pragma once
 
 #include <functional>
@@ -18,14 +18,14 @@
 
 namespace covary {
 
-/// What is known of the inputs before anything is estimated.
+/// What is known about the inputs before estimation.
 struct InputFindings {
   InputReport report;
   std::vector<Finding> findings;  ///< of the report, and from the images' own attributes
 };
 
 struct CombineRequest {
-  std::optional<GroupedSource> crn;  ///< none with an estimator of EstimatorPasses::kIndependent
+  std::optional<GroupedSource> crn;  ///< none for an estimator with EstimatorPasses::kIndependent
   GroupedSource independent;
   std::optional<GroupedSource> light;  ///< a light film (film/splat_layer.h), to be added
   std::vector<LayerSource> layers;     ///< parts of the independent image, for estimators that split them
@@ -43,9 +43,9 @@ struct CombineRequest {
 
 struct CombinedImage {
   EstimatorResult image;
-  /// The request's by name, and kRest if these leave some of the image: together they add up to its estimate.
+  /// The request's layers by name, and kRest if these leave some of the image: together they sum to its estimate.
   std::map<std::string, Image> layers;
-  std::optional<PredictedError> predicted;  ///< where there is a standard error
+  std::optional<PredictedError> predicted;  ///< if there is a standard error
   InputFindings inputs;
   double planned_memory = 0;  ///< planned_memory() of the request
   double check_seconds = 0, estimate_seconds = 0;
@@ -58,26 +58,25 @@ InputFindings examine(const CombineRequest& request);
 /// `force` is not set, and whatever the estimator throws.
 CombinedImage combine(const CombineRequest& request);
 
-/// relMSE of the mean of `image`, predicted by its groups, reading so many rows at a time: the error of the plain
-/// samples.
+/// relMSE of the mean of `image` (the plain samples), predicted from its groups, reading `rows` rows at a time.
 double predicted_relmse_of_mean(const GroupedSource& image, int rows);
 
 /// Approximate peak memory of combine() in bytes: input, working memory of the estimator, and result.
 double planned_memory(const CombineRequest& request);
-/// The same for so many rows at a time.
+/// Same for `rows` rows at a time.
 double memory_of_rows(const CombineRequest& request, int rows);
 /// Rows that combine() has in memory at a time.
 int rows_in_memory(const CombineRequest& request);
 
-/// Rows of both images; none of a missing one.
+/// Rows of both images; empty for a missing one.
 struct Band {
   GroupedImage crn, independent;
   int first = 0;
 };
-/// Rows first … last - 1 with the estimator's reach on both sides, so that bands have the bits of the whole.
+/// Rows first … last - 1 and the estimator's reach on both sides, so that bands have the bits of the whole.
 Band band_around(const CombineRequest& request, int first, int last);
 
-/// The last steps of every image that an estimator made of films: held-out samples calibrate its standard error, and
+/// The last steps for every image that an estimator made from films: held-out samples calibrate its standard error, and
 /// the mean of the light film's rows, if any, is added.
 void finish(EstimatorResult& result, const GroupedImage* light);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The settings of `covary combine`. Python's combine() takes images instead of files, and otherwise the same settings.
+// The settings of `covary combine`. Python's combine() takes images instead of files, but otherwise the same settings.
 #pragma once
 
 #include <optional>
@@ -12,7 +12,7 @@
 
 namespace covary {
 
-/// In the full frame.
+/// Position in the full frame.
 struct PixelPosition {
   int x, y;
 };
@@ -21,7 +21,7 @@ struct CombineSettings {
   std::vector<std::string> crn;          ///< files of one image, see GroupedFile; empty: `independent` is denoised
   std::vector<std::string> independent;  ///< likewise
   std::string output;
-  std::string crn_layer, independent_layer;  ///< of files with several layers
+  std::string crn_layer, independent_layer;  ///< for files with several layers
   std::string counts;                        ///< file with the samples of each pixel of the independent image
   std::string light;                         ///< film of light paths
   std::string guides;                        ///< file with the guides of the denoising
@@ -29,8 +29,8 @@ struct CombineSettings {
   std::string estimator = kDefaultEstimator;
   std::optional<int> samples;  ///< samples per pixel of the CRN image
   DenoisingChoice denoising;
-  bool error = false;  ///< estimate the standard error, too
-  bool force = false;  ///< combine in spite of errors in the inputs
+  bool error = false;  ///< also estimate the standard error
+  bool force = false;  ///< combine despite errors in the inputs
   std::optional<PixelPosition> explain;
   std::optional<double> memory_mib;  ///< memory limit
 };

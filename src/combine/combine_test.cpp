@@ -115,7 +115,7 @@ TEST(Combine, AnIndependentImageAloneIsDenoised) {
   EXPECT_EQ(combined.predicted->relmse, predicted_relmse(expected));
   EXPECT_TRUE(combined.image.interval) << "the error of a mean that was denoised has bounds";
   EXPECT_GT(combined.inputs.report.independent_mean, 0);
-  // Groups that are one render are found.
+  // Groups that are copies of one render are detected.
   test::Grouped twice = images.independent;
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x) std::copy_n(twice.pixel(x, y), 3, twice.pixel(x, y) + 3);

@@ -11,11 +11,12 @@
 namespace covary {
 namespace {
 
-// Beyond every pixel filter, but within the reach of denoisers. Measured correlations of signs of differences at this
-// distance: noise of any sampler at most 0.02; Open Image Denoise 0.16 to 0.51; our own filters 0.08 to 0.26.
+// Beyond any pixel filter, but within the reach of denoisers. Measured correlations of signs of differences at this
+// distance: at most 0.02 for the noise of any sampler; 0.16 to 0.51 for Open Image Denoise; 0.08 to 0.26 for our own
+// filters.
 constexpr int kDistance = 6;
 constexpr double kMaxCorrelation = 0.07;
-constexpr double kMaxExcess = 0.05;  // of the fraction of pixels in which one render is brighter, beyond one half
+constexpr double kMaxExcess = 0.05;  // of the fraction of pixels in which one render is brighter, above one half
 constexpr double kSigmas = 6;
 constexpr double kMostlyBrighter = 0.9;
 constexpr long kMaxPixels = 1000000;
@@ -36,7 +37,7 @@ double DifferenceChecks::Pair::excess_brighter() const {
   return differ > 0 ? std::abs(static_cast<double>(brighter) / static_cast<double>(differ) - 0.5) : 0;
 }
 
-/// Correlation of the signs beyond what their mean alone implies.
+/// Correlation of the signs beyond what their mean implies.
 double DifferenceChecks::Pair::correlation() const {
   if (n == 0) return 0;
   const double mean = 2 * excess_brighter();
@@ -45,7 +46,7 @@ double DifferenceChecks::Pair::correlation() const {
 
 DifferenceChecks::DifferenceChecks(int width, int height, int groups)
     : pairs_(std::clamp(groups - 1, 0, kMaxPairs)),
-      // Rows are left out, an odd number at a time.
+      // Uses one row in `step_`, an odd number.
       step_(static_cast<int>(std::max(1L, long{width} * height / kMaxPixels)) | 1) {}
 
 void DifferenceChecks::add_rows(const GroupedImage& image) {

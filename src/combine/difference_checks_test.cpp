@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The checks find each planted fault of two renders and none in good ones. Seeds are fixed. With 40,000 pixels the
+// The checks detect each planted fault of two renders, and none in good ones. Seeds are fixed. With 40,000 pixels, the
 // fraction of brighter ones has standard deviation 0.0025, the correlation of signs 0.005.
 #include "combine/difference_checks.h"
 
@@ -26,7 +26,7 @@ std::string findings(const test::Grouped& image) {
 
 test::Grouped good(int groups) { return test::independent_image(kWidth, kHeight, groups, 3); }
 
-/// Each render filtered by a mean over 15 pixels of a row, as a denoiser mixes neighbours.
+/// Each render filtered by a mean over 15 pixels of a row, mixing neighbours as a denoiser does.
 test::Grouped denoised(const test::Grouped& image) {
   constexpr int kReach = 7;
   test::Grouped result = image;

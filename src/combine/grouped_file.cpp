@@ -17,8 +17,8 @@
 namespace covary {
 namespace {
 
-constexpr const char* kCounts = "samples";               // channel of covary's films
-constexpr const char* kVariance = "variance_in_groups";  // channels .R .G .B of some of them
+constexpr const char* kCounts = "samples";               // channel in covary's films
+constexpr const char* kVariance = "variance_in_groups";  // channels .R .G .B in some of them
 
 [[noreturn]] void fail(const std::string& path, const std::string& what) {
   throw Error(ErrorCode::kInput, path + ": " + what);
@@ -53,7 +53,7 @@ double samples_per_pixel(const ExrFile& file, const std::string& path) {
   return value;
 }
 
-/// "group07" -> ("group", 7); number -1 without digits at the end.
+/// "group07" -> ("group", 7); number -1 if there are no trailing digits.
 std::pair<std::string, int> split_number(const std::string& name) {
   size_t digits = name.size();
   while (digits > 0 && std::isdigit(static_cast<unsigned char>(name[digits - 1]))) --digits;
@@ -69,7 +69,7 @@ std::string list_layers(const ExrFile& file, const std::vector<ColourLayer>& lay
   return fmt::format("channels in it: {}", fmt::join(names, ", "));
 }
 
-/// Numbered layers STEM0, STEM1, …, in the order of their numbers; `stem` "" takes the only stem.
+/// Numbered layers STEM0, STEM1, …, ordered by number; `stem` "" means the only stem.
 std::vector<ColourLayer> numbered_layers(const std::vector<ColourLayer>& layers, const std::string& stem) {
   std::vector<std::pair<int, const ColourLayer*>> found;
   std::string first_stem;
@@ -86,7 +86,7 @@ std::vector<ColourLayer> numbered_layers(const std::vector<ColourLayer>& layers,
   return result;
 }
 
-/// The one image of a file.
+/// The only image in a file.
 const ColourLayer& single_layer(const std::string& path, const ExrFile& file, const std::vector<ColourLayer>& layers,
                                 const std::string& name) {
   if (name.empty()) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Grouped images in EXR files of any renderer: films of covary, one file with a layer per group, or one file per group
-// as Mitsuba 3, pbrt-v4 and Blender write them. Rows are read on demand, so that memory does not depend on the image
+// as written by Mitsuba 3, pbrt-v4 and Blender. Rows are read on demand, so that memory is independent of the image
 // height.
 #pragma once
 
@@ -18,9 +18,9 @@ namespace covary {
 class GroupedFile {
  public:
   /// One path: all groups, as layers whose names differ in a number (group00.R, group00.G, …), or a single image.
-  /// Several paths: one image each, with the groups in that order. An image is a colour layer of film/image_file.h; if
-  /// a file has several, `layer` names one (without the number of the group), or else the picture is used. Throws
-  /// Error(kIo), and Error(kInput) with the layers found.
+  /// Several paths: one image each, giving the groups in that order. An image is a colour layer of film/image_file.h;
+  /// if a file has several, `layer` names one (without the group number), or else the picture is used. Throws
+  /// Error(kIo), and Error(kInput) listing the layers found.
   explicit GroupedFile(const std::vector<std::string>& paths, const std::string& layer = "");
 
   int width() const { return place_.window.width; }
@@ -32,8 +32,8 @@ class GroupedFile {
   /// Whether the number of samples of each pixel is known, so that read_rows() gives counts.
   bool has_counts() const { return has_counts_ || counts_file_ || count_of_all_ > 0; }
   /// Sets the counts for files without them: an EXR file of the same pixels with one channel of whole numbers, or one
-  /// named "samples": samples of all groups together, which then have the sizes of film/groups.h. Throws Error(kIo),
-  /// and Error(kInput) if the file is different or the counts are known already.
+  /// named "samples": total samples of all groups, which then have the sizes of film/groups.h. Throws Error(kIo), and
+  /// Error(kInput) if the file does not match or the counts are already known.
   void take_counts(const std::string& path);
   /// The same number, > 0, for all pixels.
   void take_count(uint32_t samples);
@@ -67,8 +67,8 @@ class GroupedFile {
     std::array<std::string, 3> channels;
   };
   void add_file(const std::string& path, const std::string& layer, bool only_file);
-  /// From covary's films. The groups of one film follow from its counts; other groups must have equal numbers of
-  /// samples.
+  /// Reads metadata of covary's films. The groups of one film follow from its counts; other groups must have equal
+  /// numbers of samples.
   void take_film_facts(const std::string& path, const ExrFile& file, bool may_be_film);
   void read_counts(int first_row, int n_rows, std::vector<uint32_t>& counts) const;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layouts of several renderers, made here with the same channel names as theirs.
+// Layouts of several renderers, imitated here with the same channel names.
 #include "combine/grouped_file.h"
 
 #include <fmt/format.h>

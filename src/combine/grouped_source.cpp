@@ -29,7 +29,7 @@ GroupedSource source_of(const GroupedImage& image, ImageOrigin origin) {
   GroupedSource source;
   source.origin = std::move(origin);
   source.width = image.width, source.height = image.height, source.groups = image.groups;
-  GroupedImage whole = image;  // rows of it know the mean of the whole
+  GroupedImage whole = image;  // its rows know the mean count of the whole
   if (image.counts && image.mean_count == 0) {
     const size_t n_pixels = static_cast<size_t>(image.width) * image.height;
     whole.mean_count = std::accumulate(image.counts, image.counts + n_pixels, 0.0) / static_cast<double>(n_pixels);

@@ -15,17 +15,17 @@ namespace {
 
 using Severity = Finding::Severity;
 
-// Limits. Measured rank correlations of neighbours: box filter 0.01 or less, tent 0.24, Mitsuba's Gaussian 0.35; common
-// random numbers 0.5 to 0.9, in the worst textures and caustics still above 0.05.
+// Limits. Measured rank correlations of neighbours: at most 0.01 for a box filter, 0.24 for a tent, 0.35 for Mitsuba's
+// Gaussian; 0.5 to 0.9 for common random numbers, still above 0.05 in the worst textures and caustics.
 constexpr double kMaxIndependentCorrelation = 0.05;
 constexpr double kMinCrnCorrelation = 0.02;
-constexpr double kMaxSigmas = 8;  // for t with about 11 degrees of freedom: false alarm below 1e-5
+constexpr double kMaxSigmas = 8;  // for t with about 11 degrees of freedom: false-alarm rate below 1e-5
 constexpr long kMaxPairs = 250000;
 constexpr long kFewPairs = 200;
 
 float grey(const float* rgb) { return (rgb[0] + rgb[1] + rgb[2]) * (1.0f / 3.0f); }
 
-/// Ranks 0 … T-1 of the grey group values of a pixel, ties averaged, minus their mean; false without any variation.
+/// Ranks 0 … T-1 of the grey group values of a pixel, ties averaged, minus their mean; false if all values are equal.
 bool centred_ranks(const GroupedImage& image, int x, int y, std::vector<float>& values, std::vector<float>& ranks) {
   const int T = image.groups;
   const float* p = image.pixel(x, y);
@@ -51,7 +51,7 @@ class PairStatistics {
       : T_(groups_a == groups_b && groups_a >= 3 ? groups_a : 0),
         dx_(dx),
         dy_(dy),
-        // An odd step, so that a pattern of even period is not always hit at the same phase.
+        // An odd step, so that patterns of even period are not always sampled at the same phase.
         step_(std::max(1L, n_pixels / kMaxPairs) | 1),
         values_(T_),
         first_(T_),
@@ -123,7 +123,7 @@ void add_values(const GroupedImage& image, int first_row, Values& v) {
 
 void finish(Values& v, long pixels) {
   const size_t T = v.group_means.size();
-  // Weights of mean 1: larger groups count more.
+  // Weights with mean 1: larger groups count more.
   const double total = std::accumulate(v.group_samples.begin(), v.group_samples.end(), 0.0);
   for (double& samples : v.group_samples) samples = samples > 0 ? samples * static_cast<double>(T) / total : 1;
   for (size_t t = 0; t < T; ++t) {

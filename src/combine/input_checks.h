@@ -37,19 +37,19 @@ struct InputReport {
   bool has_errors() const;
 };
 
-/// Measures the images and reports what is wrong. Checks the values of every pixel, and at most about 250 000 pairs for
-/// each correlation. Images may be given in bands of rows, from top to bottom; pairs across bands are left out.
+/// Measures the images and reports problems. Checks the values of every pixel, and at most about 250 000 pairs for each
+/// correlation. Images may be given in bands of rows, from top to bottom; pairs across bands are skipped.
 class InputChecks {
  public:
-  /// Groups may have unequal sizes: rank correlations ignore sizes, means of groups are weighted by their samples. The
-  /// images may have different numbers of groups; with fewer than 3, correlations cannot be measured, which is a
+  /// Groups may have unequal sizes: rank correlations ignore sizes; means of groups are weighted by their samples. The
+  /// images may have different numbers of groups; with fewer than 3, correlations cannot be measured, which gives a
   /// warning. `crn_groups` 0: there is no CRN image, and pixels of the independent image may depend on each other, but
-  /// not its groups.
+  /// its groups may not.
   InputChecks(int width, int height, int crn_groups, int independent_groups);
   ~InputChecks();
   /// The next rows of both images. Throws Error(kUsage) if sizes differ or there are no rows.
   void add_rows(const GroupedImage& crn, const GroupedImage& independent);
-  /// After the last row.
+  /// Call after the last row.
   InputReport report() const;
 
  private:

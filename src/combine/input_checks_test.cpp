@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The checks find each planted fault and none in good images. Seeds are fixed. With N pairs of T = 12 groups a mean
-// rank correlation has standard error 1 / sqrt(11 N) = 0.0045 for 80 x 60 pixels; faults planted are 20 and more of
-// them, and the false-alarm limit max(0.05, 5 standard errors) is 11.
+// The checks detect each planted fault, and none in good images. Seeds are fixed. With N pairs of T = 12 groups, a mean
+// rank correlation has standard error 1 / sqrt(11 N) = 0.0045 for 80 x 60 pixels; planted faults are at least 20 times
+// that, and the false-alarm limit max(0.05, 5 standard errors) is 11 times that.
 #include "combine/input_checks.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ std::string findings(const test::Grouped& crn, const test::Grouped& independent)
   return text;
 }
 
-/// Convolution with a horizontal filter (w, 1 - 2 w, w), as a wide pixel filter does it.
+/// Convolution with a horizontal filter (w, 1 - 2 w, w), like a wide pixel filter.
 test::Grouped filtered(const test::Grouped& image, float w) {
   test::Grouped result = image;
   for (int y = 0; y < image.height; ++y)
@@ -55,7 +55,7 @@ TEST(InputChecks, GoodImagesPass) {
 }
 
 TEST(InputChecks, FindsWidePixelFilters) {
-  // Mixing in 10 % of both neighbours correlates by 2 * 0.1 * 0.8 / (0.8^2 + 2 * 0.1^2) = 0.24, as a tent filter does.
+  // Mixing in 10 % of both neighbours gives correlation 2 * 0.1 * 0.8 / (0.8^2 + 2 * 0.1^2) = 0.24, like a tent filter.
   const std::string text = findings(good_crn(), filtered(good_independent(), 0.1f));
   EXPECT_NE(text.find("!independent image: errors of neighbouring pixels have a rank correlation of +0.2"),
             std::string::npos)

@@ -11,7 +11,7 @@
 namespace covary {
 namespace {
 
-constexpr double kNothing = 1e-3;  // of the picture
+constexpr double kNothing = 1e-3;  // relative to the picture
 
 [[noreturn]] void fail(const std::string& name, const std::string& text) {
   throw Error(ErrorCode::kInput, fmt::format("the layer '{}' {}", name, text));

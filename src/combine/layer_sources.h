@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layers of an independent image from any renderer, such as direct light or the light of single lamps.
+// Layers of an independent image from any renderer, such as direct light or the light of individual lamps.
 #pragma once
 
 #include <span>
@@ -16,15 +16,15 @@ struct LayerSource {
   GroupedSource groups;
 };
 
-/// The rest of the image that the given layers leave.
+/// The remainder of the image after the given layers.
 inline constexpr const char* kRest = "Rest";
 
-/// Layers that add up to the image: those of `sources`, and kRest if these leave more than a thousandth of it (less may
-/// be rounding, for example of 16-bit files).
+/// Layers that sum to the image: those of `sources`, and kRest if these leave more than a thousandth of it (less may be
+/// rounding, for example in 16-bit files).
 class WholeLayers {
  public:
-  /// What `picture` and the sources point to must live as long. Throws Error(kInput) if a layer has other pixels or
-  /// groups, is named twice or kRest, or has a value that is not finite where the picture's is.
+  /// The memory that `picture` and the sources refer to must outlive this object. Throws Error(kInput) if a layer has
+  /// other pixels or groups, is a duplicate, is named kRest, or has a non-finite value where the picture is finite.
   WholeLayers(const GroupedImage& picture, std::span<const LayerSource> sources);
   std::span<const Layer> view() const { return layers_; }
 

@@ -19,7 +19,7 @@ namespace {
 
 constexpr int kWidth = 32, kHeight = 24, kGroups = 4;
 
-/// An image of two lamps, each with noise of its own.
+/// An image with two lamps, each with its own noise.
 struct Lamps {
   std::vector<float> both, key, fill;
   Lamps() {

@@ -15,7 +15,7 @@ struct DenoisingChoice;
 
 struct EstimatorPlugin {
   const char* name;
-  /// Throws Error(kUsage) that lists everything that is wrong with the options.
+  /// Throws Error(kUsage) listing everything wrong with the options.
   Estimator (*make)(Settings& parameters);
 };
 

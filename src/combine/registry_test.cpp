@@ -47,7 +47,7 @@ TEST(EstimatorRegistry, BeginsWithTheDefaultAndRepeatsNothing) {
   EXPECT_EQ(make_estimator(kNoEstimator).passes, EstimatorPasses::kAny);
 }
 
-/// Options of one name mean one thing on the command line, whichever estimators have them.
+/// Options with the same name have the same meaning on the command line, whichever estimators have them.
 TEST(EstimatorRegistry, OptionsOfOneNameAgree) {
   std::map<std::string, Option> seen;
   for (const std::string& name : estimator_names())
@@ -81,7 +81,7 @@ bool has(const std::vector<Option>& options, const std::string& name) {
   return std::any_of(options.begin(), options.end(), [&](const Option& o) { return o.name == name; });
 }
 
-/// What must be given beside an option so that it has an effect.
+/// Options that an option requires to have an effect.
 OptionValues with_what_it_needs(const std::string& name, OptionValues values) {
   const auto given = [&](std::initializer_list<const char*> options) {
     return std::any_of(options.begin(), options.end(), [&](const char* o) { return values.contains(o); });
@@ -142,7 +142,7 @@ TEST(EstimatorRegistry, ValuesReachTheOptions) {
   EXPECT_EQ(make_estimator("iicv", {{"paper", ""}, {"k", "50"}}).text, "iicv --paper --k 50");
 }
 
-/// What each says of itself holds.
+/// What each estimator claims is true.
 TEST(EstimatorRegistry, EachEstimatorDoesWhatItSays) {
   const auto groups = [](int n, uint64_t seed, bool common) {
     return common ? test::crn_image(kWidth, kHeight, n, seed) : test::independent_image(kWidth, kHeight, n, seed);
@@ -266,7 +266,7 @@ TEST(EstimatorRegistry, OptionsWithoutEffectAreErrors) {
   for (const Case& c : cases)
     EXPECT_TRUE(message(c.estimator, c.values).starts_with(fmt::format("`{}` has no effect ", c.option)))
         << message(c.estimator, c.values);
-  // These decide themselves that the others have one.
+  // These check for themselves that the others are given.
   EXPECT_NO_THROW(make_estimator("iicv", {{"penalty", "pilot"}, {"pilot-window", "5"}}));
   EXPECT_NO_THROW(make_estimator("dependent-tests", {{"filter", "exact"}, {"window", "5"}}));
   EXPECT_NO_THROW(make_estimator("dependent-tests", {{"filter", "paper"}, {"max-region", "5"}}));
@@ -314,7 +314,7 @@ std::string row_of(const Option& o) {
                      as_flags(o.help));
 }
 
-/// The page has a row for each estimator, and below its heading one for each of its options; and no others.
+/// The page has a row for each estimator, and below its heading one for each of its options; no others.
 TEST(EstimatorRegistry, IsDocumented) {
   std::string expected;
   for (const std::string& name : estimator_names()) expected += row_of(make_estimator(name)) + "\n";

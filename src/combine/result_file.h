@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes the image that an estimator made.
+// Writes the image made by an estimator.
 #pragma once
 
 #include <map>
