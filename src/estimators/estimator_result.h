@@ -17,7 +17,7 @@ struct HeldOutRow {
   double error = 0;      ///< squared error of images made from half of the samples
   double variance = 0;   ///< its variance part
   double predicted = 0;  ///< squared standard error of the image made from all samples
-  double squares = 0;    ///< sum of squared `error` over the segments of the row; their number is `parts`
+  double squares = 0;    ///< sum of squared `error` of the `parts` segments of the row
   int parts = 0;
 };
 
@@ -26,8 +26,7 @@ struct HeldOutRow {
 struct RiskRow {
   double error = 0;                                  ///< (M - h)^2 - v + 2 cov(M, h)
   double covariance = 0;                             ///< 2 cov(M, h)
-  double squares = 0;                                ///< sum of squared `error` over the segments of the row; their
-                                                     ///< number is `parts`
+  double squares = 0;                                ///< sum of squared `error` of the `parts` segments of the row
   double variance = 0;                               ///< of the image, from the difference of halves
   double noise = 0;                                  ///< v
   double noise_squares = 0;                          ///< sum over pixels of v^2

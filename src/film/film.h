@@ -114,8 +114,7 @@ class Film {
 
 /// Attribute keys known to this module.
 namespace film_key {
-inline constexpr const char* kSeed = "seed";             ///< decimal; after a merge all seeds in ascending order:
-                                                         ///< "1,2,7"
+inline constexpr const char* kSeed = "seed";             ///< decimal; after a merge all seeds, ascending: "1,2,7"
 inline constexpr const char* kSampling = "sampling";     ///< "independent" or "crn"
 inline constexpr const char* kSceneHash = "scene_hash";  ///< hash of the scene's content
 inline constexpr const char* kSettings = "settings";     ///< all options that change the samples, except the seed

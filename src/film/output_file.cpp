@@ -185,8 +185,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMostOpen = 64;  // the handler does not know files beyond these; the next create() for the same target
-                                  // removes them
+constexpr size_t kMostOpen = 64;  // the handler ignores further files; the next create() for their target removes them
 constexpr const char* kEnding = ".part";
 
 /// A path without allocation, for the signal handler.

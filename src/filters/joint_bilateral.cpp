@@ -12,8 +12,7 @@ namespace {
 
 constexpr int kRadius = 8;
 constexpr float kSpatial = 4, kAlbedo = 0.1f, kNormal = 0.3f;  // standard deviations
-constexpr int kGuides = 6, kFinite = 9, kCount = 10;           // planes: guides, RGB, 1 where RGB is finite, otherwise
-                                                               // 0
+constexpr int kGuides = 6, kFinite = 9, kCount = 10;           // planes: guides, RGB, 1 or 0: whether RGB is finite
 
 bool same_size(const Image& a, const Image& b) {
   return a.width == b.width && a.height == b.height && a.channels == 3 && b.channels == 3;

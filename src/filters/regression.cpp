@@ -109,7 +109,7 @@ class Regression {
     return load(planes_.row(kStep * c + place.residue, y) + x + place.column);
   }
 
-  /// `row`: row of windows; `from`: the row of the sums where it begins.
+  /// `row`: row of windows; `from`: the row of the sums that holds their centres.
   void add_windows(int x, int row, int from, Planes& sums) const {
     Windows w;
     const int y = kStep * row + 1;

@@ -115,8 +115,7 @@ struct GuidedBatch final : CameraBatch<GuidedPathState, LightSetChoice, GuidedCo
   std::vector<uint32_t> ended;                  ///< samples whose paths ended at their last vertex, which has a control
   std::vector<ControlledVertexState> vertices;  ///< the last vertex of each path, by Path::sample
   std::vector<ConnectionParts> connection_parts;
-  std::vector<TechniqueDensities> connection_weights;  ///< of the techniques that sample directions, while learning
-                                                       ///< coefficients
+  std::vector<TechniqueDensities> connection_weights;  ///< per direction technique, while learning coefficients
 
   bool recording = false;
   std::vector<uint32_t> n_steps;       ///< recorded steps of each path, by Path::sample

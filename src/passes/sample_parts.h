@@ -13,10 +13,10 @@
 
 namespace covary {
 
-/// Adds to film i of `parts` part i of the samples of `film`, until counts match; the films of `parts` have the same
-/// groups and window. Takes as long as rendering `film` did. `settings`: those of the film's pass; returns early, with
-/// fewer samples, once settings.stop is true. Samples that are black in the film because they are negative or not
-/// finite are black in all parts.
+/// Adds to film i of `parts` part i of the samples of `film`, until its counts are reached; the films of `parts` must
+/// agree in groups, counts and window. Takes as long as rendering `film` did. `settings`: those of the film's pass;
+/// returns early, with fewer samples, once settings.stop is true. Samples that are black in the film because they are
+/// negative or not finite are black in all parts.
 void trace_parts(const Scene& scene, const Integrator& integrator, const PassSettings& settings, const Film& film,
                  std::span<Film> parts);
 

@@ -24,8 +24,7 @@ namespace covary {
 struct GuidingSettings {
   VmfFitSettings fit{.max_steps = 10};  ///< each wave continues from the fit of the previous one
   uint32_t leaf_samples = 8000;         ///< a leaf with more is split
-  uint32_t min_leaf_samples = 100;      ///< a leaf with fewer samples, zero-valued ones included, is not used for
-                                        ///< guiding
+  uint32_t min_leaf_samples = 100;      ///< a leaf with fewer samples, including zeros, does not guide
   uint32_t max_depth = 32;              ///< of the tree
   uint32_t max_samples = 1u << 22;      ///< kept while training
   bool learn_fraction = false;          ///< find the best fraction of guided directions for each leaf

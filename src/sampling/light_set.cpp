@@ -66,8 +66,7 @@ std::vector<float> whole_steps(const std::vector<double>& weights) {
   for (size_t i = 0; i < weights.size(); ++i) {
     double n = 0;
     if (weights[i] > 0) {
-      const double exact = weights[i] / sum * (kSteps - n_positive) + rest;  // the rounding remainder carries over to
-                                                                             // the next
+      const double exact = weights[i] / sum * (kSteps - n_positive) + rest;  // rounding remainder of the previous one
       n = std::floor(std::max(exact, 0.0));
       rest = exact - n;
       n += 1;

@@ -19,8 +19,7 @@ float half_extent_x(float fov_degrees, FovAxis axis, float aspect);
 /// Perspective camera with a pinhole or a thin lens, or orthographic camera.
 struct CameraSettings {
   Transform to_world;
-  bool orthographic = false;  ///< parallel rays along z from the square [-1, 1]^2, with the height scaled by the film's
-                              ///< aspect
+  bool orthographic = false;  ///< parallel rays along z from [-1, 1]^2, its height scaled by the film's aspect
   float fov_degrees = 50;     ///< full angle, in (0, 180)
   FovAxis fov_axis = FovAxis::kX;
   float near_clip = 1e-2f, far_clip = 1e4f;  ///< distances along the viewing axis
