@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The estimator shared by all image-space control variates of Yang & Moon 2025: Eq. (7) with the coefficients of Eq.
-// (10),
+// The estimator shared by all image-space control variates of Yang & Moon 2025: Eq. (7) with the coefficients of
+// Eq. (10),
 //     F^ = f - sum_i beta_i (g_i - h_i),    beta = (X^T X / (T - 1) + V_h)^-1 X^T y / (T - 1),
 // for every pixel, given the error variances V_h. X, y: centred group means of the CRN image at the neighbours and at
-// the target; f, g: their means; h: means of the independent image. Methods differ in their choice of V_h (iicv.h,
-// cv_baseline.h).
+// the target; f, g: their means; h: means of the independent image. Methods differ in their choice of V_h
+// (iicv.h, cv_baseline.h).
 //
 // Unequal group sizes n_t within a pixel: the row of group t in X and y is weighted by sqrt(n_t T / N), N = sum n_t, so
 // that all rows have the same variance and X^T X / (T - 1) estimates T times the covariance of the means, as with equal
