@@ -76,10 +76,10 @@ void DifferenceChecks::report(std::vector<Finding>& findings) const {
     if (is_correlated && brighter < kMostlyBrighter)
       findings.push_back(
           {Finding::Severity::kError,
-           fmt::format("renders {} and {} differ alike in pixels {} apart (signs correlate by {:.2f}; noise has 0): "
+           fmt::format("differences of renders {} and {} are correlated {} pixels apart (signs by {:.2f}; noise by 0): "
                        "they were denoised before, their pixels share random numbers, or they show different scenes, "
                        "lights or exposures (one is brighter in {:.0f} % of the pixels); render both without a "
-                       "denoiser, alike but for the seed",
+                       "denoiser, differing only in the seed",
                        t + 1, t + 2, kDistance, correlation, 100 * brighter)});
     else if (is_brighter)
       findings.push_back(

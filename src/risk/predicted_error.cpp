@@ -86,9 +86,9 @@ std::string doubt_of(const EstimatorResult& result, double samples, uint32_t rel
   const auto& [uncertainty, ratio] = *result.verdict;
   if (!std::isfinite(uncertainty)) return "held-out samples do not confirm it";
   if (uncertainty > kMostUncertainty)
-    return fmt::format("held-out samples know it only to ±{:.0f} %", 100 * uncertainty);
+    return fmt::format("held-out samples determine it only to ±{:.0f} %", 100 * uncertainty);
   if (ratio > kMostDisagreement || ratio < 1 / kMostDisagreement)
-    return fmt::format("held-out samples tell {:.2g} times as much as the estimator itself", ratio);
+    return fmt::format("held-out samples give {:.2g} times what the estimator predicts", ratio);
   return "";
 }
 

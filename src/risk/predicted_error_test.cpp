@@ -71,10 +71,10 @@ TEST(PredictedError, IsDoubtedWhereHeldOutSamplesDoNotConfirmIt) {
   EXPECT_EQ(doubt(0.2, 1), "");
   EXPECT_EQ(doubt(0.49, 3.9), "");
   EXPECT_EQ(doubt(0.49, 0.26), "");
-  EXPECT_EQ(doubt(0.8, 1), "held-out samples know it only to ±80 %");
+  EXPECT_EQ(doubt(0.8, 1), "held-out samples determine it only to ±80 %");
   EXPECT_EQ(doubt(std::numeric_limits<double>::infinity(), 1), "held-out samples do not confirm it");
-  EXPECT_EQ(doubt(0.2, 33), "held-out samples tell 33 times as much as the estimator itself");
-  EXPECT_EQ(doubt(0.2, 0.2), "held-out samples tell 0.2 times as much as the estimator itself");
+  EXPECT_EQ(doubt(0.2, 33), "held-out samples give 33 times what the estimator predicts");
+  EXPECT_EQ(doubt(0.2, 0.2), "held-out samples give 0.2 times what the estimator predicts");
 }
 
 TEST(PredictedError, NeedsAStandardError) {

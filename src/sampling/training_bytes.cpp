@@ -15,7 +15,7 @@ constexpr uint32_t kVersion = 2;
 }  // namespace
 
 std::string_view ByteReader::take(size_t size) {
-  if (bytes_.size() < size) fail("is truncated: a training file was expected to go on");
+  if (bytes_.size() < size) fail("is truncated: the training file ends too early");
   const std::string_view taken = bytes_.substr(0, size);
   bytes_.remove_prefix(size);
   return taken;
@@ -43,7 +43,7 @@ std::string_view training_file_body(std::string_view bytes, const std::string& k
   const std::string_view found = reader.take(reader.read<uint64_t>());
   const auto size = reader.read<uint64_t>(), hash = reader.read<uint64_t>();
   if (reader.rest().size() < size)
-    reader.fail(fmt::format("is truncated: {} bytes of {} are there", reader.rest().size(), size));
+    reader.fail(fmt::format("is truncated: it has {} of {} bytes", reader.rest().size(), size));
   if (reader.rest().size() > size || hash_bytes(reader.rest()) != hash)
     reader.fail("is damaged: its content does not match its checksum");
   if (found != key)

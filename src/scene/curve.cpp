@@ -36,7 +36,7 @@ CurveShape::CurveShape(CurveKind kind, std::vector<CurvePoint> points, std::vect
   }
   const size_t n = kind_ == CurveKind::kLinear ? 2 : 4;
   for (const uint32_t first : segments_)
-    if (first + n > points_.size()) throw Error(ErrorCode::kInput, "a curve uses a control point that is not there");
+    if (first + n > points_.size()) throw Error(ErrorCode::kInput, "a curve refers to a missing control point");
 }
 
 CurveShape::Centre CurveShape::centre(uint32_t segment, float v) const {
