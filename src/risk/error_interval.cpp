@@ -97,11 +97,11 @@ bool has_rare_light(const RiskRow& sums) {
 
 std::string unknown_error(const RiskRow& sums, ErrorKind kind, const LogError& error) {
   if (sums.groups < kFewestGroups && !fitted_to_few(kind))
-    return fmt::format("{:.0f} groups of samples are too few, it takes {}", sums.groups, kFewestGroups);
+    return fmt::format("{:.0f} groups of samples are too few; {} are needed", sums.groups, kFewestGroups);
   const double n = sums.noise * sums.noise / sums.noise_squares, pixels = sums.values / 3;
   if (n < kFewestPixels) return fmt::format("{:.0f} of {:.0f} pixels hold most of the noise", std::max(1.0, n), pixels);
   if (has_rare_light(sums))
-    return fmt::format("{:.0f} % of the light are in one of {:.0f} groups of each pixel", 100 * share_of_largest(sums),
+    return fmt::format("{:.0f} % of the light is in one of {:.0f} groups of each pixel", 100 * share_of_largest(sums),
                        sums.groups);
   if (not_the_mean(sums, kind) * sums.specular_noise > kMostSpecular * sums.noise)  // of what the mixture removes
     return fmt::format("{:.0f} % of the noise are in mirrors or behind glass", 100 * sums.specular_noise / sums.noise);

@@ -87,7 +87,7 @@ TEST(ErrorInterval, IsNotGivenWithFewGroups) {
   sums.groups = 7;
   EstimatorResult result = result_of(sums, ErrorKind::kPair);
   apply_interval(result);
-  EXPECT_EQ(result.interval->unknown, "7 groups of samples are too few, it takes 8");
+  EXPECT_EQ(result.interval->unknown, "7 groups of samples are too few; 8 are needed");
 }
 
 TEST(ErrorInterval, OfDenoisedMeansOfFewGroupsHasAFitOfItsOwn) {
@@ -99,7 +99,7 @@ TEST(ErrorInterval, OfDenoisedMeansOfFewGroupsHasAFitOfItsOwn) {
   EXPECT_EQ(unknown_error(sums, ErrorKind::kNetwork, {0, -0.5, 0.5}), "");
   sums.light_of_largest = 0.9 * sums.light;
   EXPECT_EQ(unknown_error(sums, ErrorKind::kNetwork, {0, -0.5, 0.5}),
-            "90 % of the light are in one of 2 groups of each pixel");
+            "90 % of the light is in one of 2 groups of each pixel");
 }
 
 TEST(ErrorInterval, IsThatOfTheTable) {
@@ -155,10 +155,10 @@ TEST(ErrorInterval, IsNotGivenWhereLightIsMissing) {
   sums.light_of_largest = 0.9 * sums.light;
   EstimatorResult result = result_of(sums, ErrorKind::kNetwork);
   apply_interval(result);
-  EXPECT_EQ(result.interval->unknown, "90 % of the light are in one of 12 groups of each pixel");
+  EXPECT_EQ(result.interval->unknown, "90 % of the light is in one of 12 groups of each pixel");
   EXPECT_FALSE(predicted_error(result, 64, 0)->bounds);
   EXPECT_EQ(predicted_error(result, 64, 0)->doubt,
-            "no interval can be given: 90 % of the light are in one of 12 groups of each pixel");
+            "no interval can be given: 90 % of the light is in one of 12 groups of each pixel");
 }
 
 TEST(ErrorInterval, IsNotGivenWhereMostNoiseIsBehindGlass) {
