@@ -28,7 +28,7 @@ class Error : public std::runtime_error {
 };
 
 /// The `candidates` nearest to `name` by edit distance, best first, at most `count`; none farther than half the length
-/// of `name`.
+/// of `name`, or 1 if that is more.
 std::vector<std::string> nearest_names(const std::string& name, const std::vector<std::string>& candidates,
                                        size_t count = 3);
 

@@ -25,7 +25,7 @@ struct ExrPlane {
 };
 
 /// Appends the channels of `image`: `name` if it has one channel; `name`.R, .G, .B if it has three, or .X, .Y, .Z for N
-/// (normal), P (position) and Motion; R, G, B if `name` is empty. The planes point into the image.
+/// and DenoisingNormal (normals), P (position) and Motion; R, G, B if `name` is empty. The planes point into the image.
 void add_image_planes(const std::string& name, Image& image, std::vector<ExrPlane>& planes);
 
 /// Position of an image: the full frame, and the pixel window a file holds, relative to the frame's corner.
