@@ -16,11 +16,11 @@
 namespace covary {
 
 /// Throws Error(kInput) when the films differ in frame, crop, groups, sampling, scene hash, settings, the list of
-/// auxiliary images or in whether they keep the sample variance; when two share a seed, and so contain the same samples;
-/// when a pixel would have more than 2^32 - 1 samples; when films of common random numbers have counts that would shift
-/// the groups of pixels differently, so that these would no longer share random numbers; and when light films and others
-/// are mixed. `names` identify the films in error messages. Attributes that all films share are kept, as are all seeds;
-/// `complete` is "true" if all films are complete.
+/// auxiliary images or in whether they keep the sample variance; when two share a seed, and so contain the same
+/// samples; when a pixel would have more than 2^32 - 1 samples; when films of common random numbers have counts that
+/// would shift the groups of pixels differently, so that these would no longer share random numbers; and when light
+/// films and others are mixed. `names` identify the films in error messages. Attributes that all films share are kept,
+/// as are all seeds; `complete` is "true" if all films are complete.
 Film merge_films(std::span<const Film> films, std::span<const std::string> names);
 
 /// Same for film files, of which only one is in memory at a time.

@@ -23,8 +23,8 @@ struct LightSetChoice {
   float u_primitive = 0;
 };
 
-/// Chooses what the vertices of `batch` sample; nothing without `connect`. All choices are made first, so that the
-/// prefetches of one overlap with the making of others. `environment`: as sampled, or null.
+/// Chooses what the vertices of `batch` sample; nothing without `connect`. All choices are made and prefetched before
+/// the first sample is taken, so that memory accesses overlap. `environment`: as sampled, or null.
 template <typename Batch>
 void choose_lights(const LightSet& lights, const Emitter* environment, std::span<const CameraSample> samples,
                    bool connect, Batch& batch) {

@@ -206,8 +206,8 @@ void follow_paths(const Scene& scene, const PathLengthSettings& lengths, std::sp
   }
 }
 
-/// One light sample for each vertex whose surface can use it. All choices are made first, so that the prefetches of one
-/// overlap with the making of others.
+/// One light sample for each vertex whose surface can use it. All lights are chosen and prefetched before the first
+/// sample is taken, so that memory accesses overlap.
 template <typename Lights>
 void sample_lights(const Scene& scene, const Lights& lights, std::span<const CameraSample> samples, PathBatch& batch) {
   for (size_t i = 0; i < batch.paths.size(); ++i) {
