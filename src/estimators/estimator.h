@@ -37,7 +37,8 @@ struct Guides {
   /// Same, but of what is seen through mirrors and glass, tinted by them; null: use those above.
   const Image* denoising_albedo = nullptr;
   const Image* denoising_normal = nullptr;
-  bool clean = false;  ///< nearly noise-free, so that a network need not prefilter them
+  const Image* position = nullptr;  ///< of the first surface, in any unit
+  bool clean = false;               ///< nearly noise-free, so that a network need not prefilter them
 };
 
 /// A component of the image, such as direct light.

@@ -30,6 +30,7 @@ struct RiskRow {
   double variance = 0;                               ///< of the image, from the difference of halves
   double noise = 0;                                  ///< v
   double noise_squares = 0;                          ///< sum over pixels of v^2
+  double specular_noise = 0;                         ///< v of pixels seen in mirrors or through glass
   double light = 0;                                  ///< light in the groups, over G' + 0.1
   double light_of_largest = 0;                       ///< light in the largest group of each pixel, likewise
   double squared_deviations = 0, fourth_powers = 0;  ///< of group means: squared variance, and fourth moment

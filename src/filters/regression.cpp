@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lanes hold adjacent windows, whose centres are three pixels apart. So each plane holds every third column: plane 3 c
-// + r of value `c` has the columns 3 i + r. Every band of rows accumulates its own sums, with a border; these are
-// combined in the order of the bands.
+// Lanes hold adjacent windows, whose centres are kStep pixels apart. So each plane holds every kStep-th column: plane
+// kStep c + r of value `c` has the columns kStep i + r. Every band of rows accumulates its own sums, with a border;
+// these are combined in the order of the bands.
 #include "filters/regression.h"
 
 #include <array>
@@ -19,19 +19,20 @@ constexpr int kRadius = 10, kPatch = 1, kSide = 2 * kRadius + 1, kOffsets = kSid
 constexpr int kBorder = kRadius + kPatch;
 constexpr int kBandRows = 8;  // of windows
 constexpr float kBandwidth = 0.5f, kOfPatch = 27;
-/// Ridge of slopes; pixels per unit of position; weight of the other image.
-constexpr float kRidge = 5e-4f, kPlaceUnit = 6, kOfOther = 1;
+/// Ridges of slopes; pixels per unit of position; weight of the other image.
+constexpr float kRidge = 5e-4f, kRidgeOfPosition = 1e-3f, kPlaceUnit = 6, kOfOther = 1;
 constexpr float kSmallestVariance = 1e-10f, kLargestVariance = 1e30f;
-/// Terms of a model: constant, columns, rows, features.
-constexpr int kMostTerms = 3 + kMostFeatures;
+/// Terms of a model: constant, columns, rows, features, position.
+constexpr int kMostTerms = 3 + kMostFeatures + 3;
 
 using Terms = std::array<vfloat, kMostTerms>;
 /// For pixels at all offsets in a row of windows.
 using RowTerms = std::array<std::array<vfloat, kSide>, kMostTerms>;
 
 /// Plane and column of the pixels `dx` columns from the centres.
-struct Place {
-  explicit Place(int dx) : residue((1 + dx + kStep * kBorder) % kStep), column((1 + dx - residue) / kStep) {}
+template <int kStep>
+struct PlaceOf {
+  explicit PlaceOf(int dx) : residue((1 + dx + kStep * kBorder) % kStep), column((1 + dx - residue) / kStep) {}
   int residue, column;
 };
 
@@ -146,9 +147,8 @@ class Regression {
     return exp2_of_nonpositive(min(sum * (-0.5f * kLog2E / (kOfPatch * kBandwidth * kBandwidth)), vfloat{}));
   }
 
-  /// The terms of the pixels of row y + dy, relative to the centres.
-  void find_terms(int x, int y, int dy, RowTerms& terms) const {
-    const Place centre(0);
+  /// The terms of the pixels of row y + dy, relative to the centres, times the roots of their weights.
+  void find_terms(int x, int y, int dy, const vfloat* roots, RowTerms& terms) const {
     for (int k = 0; k < kSide; ++k) {
       terms[0][k] = roots[k];
       terms[1][k] = roots[k] * (static_cast<float>(k - kRadius) / kPlaceUnit);
@@ -195,8 +195,7 @@ class Regression {
   }
 
   /// Adds the models' predictions for the pixels of row y + dy to `row` of the sums.
-  void predict(int x, int y, int dy, int row, const std::vector<Terms>& planes, Windows& w, Planes& sums) const {
-    find_terms(x, y, dy, w.terms);
+  void predict(int x, int y, int dy, int row, const std::vector<Terms>& planes, const Windows& w, Planes& sums) const {
     const auto add = [&](int c, const Place& place, vfloat term) {
       float* const sum = sums.row(kStep * c + place.residue, row) + x + place.column;
       store(sum, load(sum) + term);

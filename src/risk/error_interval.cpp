@@ -26,6 +26,11 @@ struct Ratio {
   double log = 0, hidden = 1;
 };
 
+/// R, but at least kLeastOverVariance V.
+double risk_of(const RiskRow& s) {
+  return std::max(s.error + kMissingCovariance * s.covariance, kLeastOverVariance * s.variance);
+}
+
 /// log(R / V), shrunk by noise.
 Ratio ratio_of(const RiskRow& s) {
   const double least = risk_of(s);
@@ -45,6 +50,10 @@ void scale(Image& std_error, double factor) {
 
 /// Whether images of this kind with few groups have a separate fit.
 bool fitted_to_few(ErrorKind kind) { return kind == ErrorKind::kFilters || kind == ErrorKind::kNetwork; }
+
+bool is_mixture(ErrorKind kind, double groups) {
+  return kind != ErrorKind::kMean && kind != ErrorKind::kPair && groups >= kFewestGroups;
+}
 
 /// Fraction of log(relMSE / V) explained by an image's features: less, the closer a mixture is to the mean.
 double not_the_mean(const RiskRow& sums, ErrorKind kind) {
@@ -104,7 +113,7 @@ std::string unknown_error(const RiskRow& sums, ErrorKind kind, const LogError& e
     return fmt::format("{:.0f} % of the light is in one of {:.0f} groups of each pixel", 100 * share_of_largest(sums),
                        sums.groups);
   if (not_the_mean(sums, kind) * sums.specular_noise > kMostSpecular * sums.noise)  // of what the mixture removes
-    return fmt::format("{:.0f} % of the noise are in mirrors or behind glass", 100 * sums.specular_noise / sums.noise);
+    return fmt::format("{:.0f} % of the noise is in mirrors or behind glass", 100 * sums.specular_noise / sums.noise);
   if (std::max(error.high - error.middle, error.middle - error.low) > std::log(kMostFactor))
     return "few samples hold most of the light";
   return "";

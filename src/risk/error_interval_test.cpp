@@ -167,7 +167,7 @@ TEST(ErrorInterval, IsNotGivenWhereMostNoiseIsBehindGlass) {
   EXPECT_EQ(unknown_error(sums, ErrorKind::kFilters, {0, -0.5, 0.5}), "");
   sums.specular_noise = 0.67 * sums.noise;
   EXPECT_EQ(unknown_error(sums, ErrorKind::kFilters, {0, -0.5, 0.5}),
-            "67 % of the noise are in mirrors or behind glass");
+            "67 % of the noise is in mirrors or behind glass");
   sums.variance = 0.4 * sums.noise;  // the mixture is the mean in part
   EXPECT_EQ(unknown_error(sums, ErrorKind::kFilters, {0, -0.5, 0.5}), "");
 }

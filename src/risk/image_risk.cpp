@@ -42,6 +42,16 @@ PixelRisk risk_at(const ImageRiskInput& in, int x, int y) {
   return pixel;
 }
 
+/// Whether the pixel shows a mirror or glass: the surface behind differs from the first one.
+bool is_specular(const Guides& surfaces, int x, int y) {
+  const auto differ = [&](const Image* first, const Image* behind) {
+    if (!first || !behind) return false;
+    const float *a = first->pixel(x, y), *b = behind->pixel(x, y);
+    return std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]) > kSameSurface;
+  };
+  return differ(surfaces.normal, surfaces.denoising_normal) || differ(surfaces.albedo, surfaces.denoising_albedo);
+}
+
 /// The fraction of light in the largest of a pixel's groups, and the variation between groups.
 void add_groups(const ImageRiskInput& in, int x, int y, double weight, RiskRow& row) {
   const GroupedImage& image = *in.groups;

@@ -102,6 +102,26 @@ TEST(ImageRisk, KnowsItsOwnScatter) {
   EXPECT_LT(told / kRuns, 5 * variance);
 }
 
+/// A wall whose left quarter is a mirror and whose next quarter is glass: the mirror shows other normals, the glass
+/// other albedos. Without images of what is behind them, nothing is known.
+TEST(ImageRisk, TellsTheNoiseInMirrorsAndBehindGlass) {
+  const Samples samples(7);
+  const Image guide = white(), albedo = white();
+  Image normal = white(), behind_mirror = white(), behind_glass = white();
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth / 4; ++x) *behind_mirror.pixel(x, y) = -1, *behind_glass.pixel(x + kWidth / 4, y) = 0.9f;
+  const std::vector<unsigned char> valid(static_cast<size_t>(kWidth) * kHeight, 1);
+  const Moments mean = moments(samples.image, valid, 0, 0.0f);
+  const auto specular = [&](const Guides& surfaces) {
+    const RiskRow sums = sum_of(image_risk({&guide, {}, &mean, {}, &samples.image, &guide, &valid, surfaces}));
+    return sums.specular_noise / sums.noise;
+  };
+  EXPECT_NEAR(specular({&albedo, &normal, &behind_glass, &behind_mirror}), 0.5, 0.05);
+  EXPECT_NEAR(specular({&albedo, nullptr, &behind_glass, nullptr}), 0.25, 0.05);
+  EXPECT_EQ(specular({&albedo, &normal, nullptr, nullptr}), 0);
+  EXPECT_EQ(specular({}), 0);
+}
+
 /// For the mean itself.
 std::vector<RiskRow> risk_of_mean(const GroupedImage& groups) {
   EstimatorResult mean = mean_of_groups(groups);
