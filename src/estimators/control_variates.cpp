@@ -10,8 +10,8 @@
 #include <cmath>
 
 #include "core/parallel.h"
-#include "filters/batch_algebra.h"
 #include "estimators/pixel_records.h"
+#include "filters/batch_algebra.h"
 #include "filters/neighbours.h"
 
 namespace covary {
