@@ -36,7 +36,7 @@ std::optional<Checksums> parse(const std::string& text) {
   }
   if (numbers.size() < 2) return std::nullopt;
   Checksums sums{numbers[0], {numbers.begin() + 1, numbers.end()}};
-  if (sums.text() != text) return std::nullopt;  // a changed bit can make a digit a capital
+  if (sums.text() != text) return std::nullopt;  // upper-case digits: a flipped bit
   return sums;
 }
 
@@ -51,7 +51,7 @@ std::string Checksums::text() const {
 std::optional<Checksums> find_checksums(const std::string& path, const std::map<std::string, std::string>& attributes) {
   const auto it = attributes.find(kChecksums);
   if (it == attributes.end()) {
-    // Under another name: of a file whose header is damaged there.
+    // Damage may have changed the attribute's name.
     for (const auto& [name, value] : attributes)
       if (parse(value))
         throw Error(ErrorCode::kInput, fmt::format("{}: damaged: the attribute '{}' holds checksums, which the "

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checksums in EXR files that covary writes (docs/file-formats.md): one of what the header says, one of each channel,
-// so that whoever reads some channels checks these.
+// Checksums in the EXR files that covary writes (docs/file-formats.md): one of the header and one per channel, so that
+// a reader of some channels can verify just those.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,8 @@
 
 namespace covary {
 
-/// Attribute: "crc32" and a word of 8 hexadecimal digits for the header, and for each channel in the order of names.
+/// Name of the attribute. Its value: "crc32", then 8 hexadecimal digits for the header and for each channel, in order
+/// of channel names.
 inline constexpr const char* kChecksums = "covary:checksums";
 
 struct Checksums {
@@ -22,18 +23,17 @@ struct Checksums {
   std::string text() const;
 };
 
-/// Those of the attributes; none where the file has none. Throws Error(kInput) with the file's name where they cannot
-/// be read: one that was damaged must not pass as one without.
+/// The checksums among the attributes; nullopt if the file has none. Throws Error(kInput) naming the file if they
+/// cannot be parsed: a damaged file must not pass for one without checksums.
 std::optional<Checksums> find_checksums(const std::string& path, const std::map<std::string, std::string>& attributes);
 
-/// CRC-32 continued by `n` values of 4 bytes, `stride` bytes from one to the next; of nothing it is 0.
+/// Updates `crc` (0 to start) with `n` values of 4 bytes, `stride` bytes apart.
 uint32_t crc_of_values(uint32_t crc, const void* first, size_t n, size_t stride);
 
-/// CRC-32 of what the header says: `shape` (windows and channels) and the attributes of covary, these checksums left
-/// out.
+/// CRC-32 of the header: `shape` (windows and channels) and covary's attributes except the checksums themselves.
 uint32_t crc_of_header(const std::string& shape, const std::map<std::string, std::string>& attributes);
 
-/// Throws Error(kInput): "`path`: `what` …" does not fit its checksum.
+/// Throws Error(kInput): "`path`: `what` …" does not match its checksum.
 [[noreturn]] void fail_checksum(const std::string& path, const std::string& what, uint32_t found, uint32_t stored);
 
 }  // namespace covary

@@ -27,7 +27,7 @@ std::string attribute(const std::string& name, const std::string& type, const st
   return attribute(name, type, value, static_cast<uint32_t>(value.size()));
 }
 
-/// What check_exr_header() says of a file with this content behind magic number and version.
+/// The error of check_exr_header() for a file with this content after the magic number and version.
 std::string complaint(const std::string& content, uint32_t version = 2) {
   const TemporaryFolder folder;
   const std::string path = folder.file("a.exr");

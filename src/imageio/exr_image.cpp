@@ -27,9 +27,9 @@ namespace covary {
 namespace Imf = OPENEXR_IMF_NAMESPACE;
 namespace {
 
-constexpr int kMaxSize = 1 << 18;  // in one direction; more is left to OpenImageIO
+constexpr int kMaxSize = 1 << 18;  // pixels per side; larger images are left to OpenImageIO
 
-/// The file's channels in the order of ImageHeader; empty where they are others than open_plain_exr() takes.
+/// The file's channels in the order of ImageHeader; empty if open_plain_exr() does not support them.
 std::vector<std::string> plain_channels(const Imf::ChannelList& channels) {
   std::vector<std::string> names;
   for (const char* name : {"R", "G", "B", "Y", "A"})
@@ -52,7 +52,7 @@ bool has_plain_size(const Imath::Box2i& window) {
 
 class PlainExr final : public ImageReader {
  public:
-  /// `file` is plain.
+  /// `file` passed the checks of open_plain_exr().
   PlainExr(const std::string& path, std::unique_ptr<Imf::InputFile> file, std::vector<std::string> channels)
       : file_(std::move(file)) {
     const Imf::Header& header = file_->header();
@@ -129,7 +129,7 @@ class HeaderCheck {
   explicit HeaderCheck(const std::string& path) : path_(path), file_(nullptr, &std::fclose) {
     std::error_code ignored;
     const bool regular = std::filesystem::is_regular_file(path, ignored);
-    if (!regular && std::filesystem::exists(path, ignored)) {  // opening a named pipe could wait for ever
+    if (!regular && std::filesystem::exists(path, ignored)) {  // opening a named pipe could block forever
       const bool folder = std::filesystem::is_directory(path, ignored);
       throw Error(ErrorCode::kIo,
                   fmt::format("cannot read {}: {}", path, folder ? "it is a folder" : "not a regular file"));
@@ -140,7 +140,7 @@ class HeaderCheck {
     left_ = std::filesystem::file_size(path, ignored);
   }
 
-  /// The first bytes of the file; fewer where it is shorter.
+  /// The first bytes of the file, or fewer if it is shorter.
   std::vector<unsigned char> magic() {
     std::vector<unsigned char> bytes(4);
     bytes.resize(std::fread(bytes.data(), 1, bytes.size(), file_.get()));
@@ -164,7 +164,7 @@ class HeaderCheck {
     throw Error(ErrorCode::kInput, fmt::format("{}: damaged EXR file: {}", path_, what));
   }
 
-  /// Checks the attributes of one part; false when there are none.
+  /// Checks the attributes of one part; false if there are none.
   bool check_part() {
     bool any = false;
     for (std::string name = text(); !name.empty(); name = text(), any = true) {
@@ -184,7 +184,7 @@ class HeaderCheck {
     return any;
   }
 
-  /// Values that hold sizes of their own.
+  /// Checks the values that carry sizes of their own.
   void check_value(const std::string& name, const std::string& type, const std::vector<char>& value) const {
     const auto number_at = [&](size_t at) {
       uint32_t number = 0;
@@ -215,7 +215,7 @@ class HeaderCheck {
     if (c == EOF) fail("the file ends in its header");
     return c;
   }
-  /// Up to the next zero byte.
+  /// Reads up to the next zero byte.
   std::string text() {
     std::string result;
     while (const int c = byte()) {
@@ -224,7 +224,7 @@ class HeaderCheck {
     }
     return result;
   }
-  /// Little-endian, like every number of the format.
+  /// Little-endian, as all numbers in EXR.
   uint32_t whole_number() {
     uint32_t number = 0;
     for (int shift = 0; shift < 32; shift += 8) number |= static_cast<uint32_t>(byte()) << shift;
@@ -233,7 +233,7 @@ class HeaderCheck {
 
   std::string path_;
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
-  uint64_t left_ = 0;  // bytes behind the place of reading
+  uint64_t left_ = 0;  // bytes left to read
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files written by OpenEXR itself; that what is read is what OpenImageIO reads is tested with its module.
+// Files written by OpenEXR. The tests of the module check that OpenImageIO reads the same values.
 #include "imageio/exr_image.h"
 
 #include <OpenEXR/ImfArray.h>
@@ -23,7 +23,7 @@ using test_support::TemporaryFolder;
 
 const Imath::Box2i kFrame({-1, -2}, {10, 20}), kData({2, 3}, {5, 5});  // 4 x 3 pixels
 
-/// Channel c of pixel i is i + 100 c + 0.25, which half holds exactly.
+/// Channel c of pixel i is i + 100 c + 0.25, which half represents exactly.
 void write(const std::string& path, const std::vector<const char*>& channels, Imf::PixelType type = Imf::FLOAT) {
   Imf::Header header(kFrame, kData);
   header.insert("note", Imf::StringAttribute("a text"));

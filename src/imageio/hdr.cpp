@@ -11,13 +11,13 @@
 namespace covary {
 namespace {
 
-constexpr size_t kLine = 256;  // longer lines of the header are left to OpenImageIO
+constexpr size_t kLine = 256;  // files with longer header lines are left to OpenImageIO
 constexpr int kMaxLines = 100;
-constexpr int kNarrow = 8;  // narrower rows are not packed
+constexpr int kNarrow = 8;  // narrower rows are not run-length encoded
 
 [[noreturn]] void fail(const char* why) { throw Error(ErrorCode::kInput, why); }
 
-/// Each row has the bytes of all reds, then of greens, blues and exponents, packed by runs; a narrow one, pixels.
+/// Rows are stored as all reds, then greens, blues and exponents, run-length encoded; narrow rows as plain RGBE pixels.
 class HdrRows final : public PlainRows {
  public:
   explicit HdrRows(std::FILE* file) : file_(file) {

@@ -22,17 +22,17 @@ namespace covary {
 namespace {
 
 constexpr size_t kMaxPixels = size_t{1} << 30;
-/// No format packs images tighter than this many values into one byte of file (deflate: about 1032).
+/// Upper bound on values per byte of file in any format (deflate: about 1032).
 constexpr size_t kMaxCompression = 10000;
 
-/// The module, or why there is none.
+/// The module, or the reason it could not be loaded.
 struct LoadedModule {
   const ImageModule* module = nullptr;
   std::string problem;
 };
 
-/// Loads the module: from the folders in the program's DT_RPATH, which are the build folder or, installed,
-/// ../lib/covary; the loader's usual places follow.
+/// Loads the module from the folders in the program's DT_RPATH (the build folder or, when installed, ../lib/covary),
+/// then from the loader's default paths.
 const LoadedModule& find_image_module() {
   static const LoadedModule loaded = []() -> LoadedModule {
     void* library = dlopen(kImageModuleFile, RTLD_NOW | RTLD_LOCAL);
@@ -55,14 +55,14 @@ const ImageModule& image_module() {
   return *loaded.module;
 }
 
-/// A file of the formats of textures; nullptr where it is another, or of a kind that OpenImageIO alone reads.
+/// Opens PNG, JPEG and HDR textures; nullptr for other formats and for variants that only OpenImageIO reads.
 std::unique_ptr<ImageReader> open_plain_image(const std::string& path) {
   for (const auto open : {open_plain_png, open_plain_jpeg, open_plain_hdr})
     if (auto reader = open(path)) return reader;
   return nullptr;
 }
 
-/// Bytes of the file; throws where it is not a regular file that can be opened.
+/// Size of the file in bytes; throws if it is not a regular file or cannot be opened.
 size_t size_of_readable(const std::string& path) {
   std::error_code status;
   if (!std::filesystem::is_regular_file(path, status)) {
@@ -90,7 +90,7 @@ void check_size(const ImageHeader& header, size_t file_bytes, const std::string&
 }
 
 /// Portable float map, which OpenImageIO 2.4 cannot write: three lines of text, then rows of little-endian floats from
-/// the bottom to the top.
+/// bottom to top.
 std::vector<unsigned char> encode_pfm(const ImageToEncode& image) {
   static_assert(std::endian::native == std::endian::little);
   const std::string head =

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the module libcovary_imageio.so offers to the program. Only image_io.cpp and oiio_module.cpp include this.
+// Interface between the program and libcovary_imageio.so. Only image_io.cpp and oiio_module.cpp include this.
 #pragma once
 
 #include <memory>
@@ -10,7 +10,7 @@
 
 namespace covary {
 
-/// No function throws: `problem` is "" or says in one line what failed.
+/// No function throws: `problem` is "" or describes the failure in one line.
 class ImageModule {
  public:
   virtual ~ImageModule() = default;
@@ -20,8 +20,8 @@ class ImageModule {
                                             std::string& problem) const = 0;
 };
 
-/// Name of the module's only function, which returns a `const ImageModule*` that lives as long as the program. The
-/// number changes with the classes of these headers, so that a program never uses a module of another build.
+/// Name of the module's only function, which returns a `const ImageModule*` valid for the life of the program. Increase
+/// the number whenever the classes in these headers change, so that a program never uses a module of another build.
 inline constexpr const char* kImageModuleEntry = "covary_image_module_2";
 inline constexpr const char* kImageModuleFile = "libcovary_imageio.so";
 

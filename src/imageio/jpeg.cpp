@@ -14,14 +14,14 @@
 namespace covary {
 namespace {
 
-// libjpeg leaves by its error function, which must not return. The exception passes through libjpeg; the destructor
-// below releases what it holds.
+// libjpeg requires that its error function does not return. The exception unwinds through libjpeg; the destructor below
+// frees its structures.
 [[noreturn]] void throw_jpeg_error(j_common_ptr jpeg) {
   std::array<char, JMSG_LENGTH_MAX> message{};
   jpeg->err->format_message(jpeg, message.data());
   throw Error(ErrorCode::kInput, message.data());
 }
-/// Level -1: a warning, of which only one is an error: the rest of the picture would be grey.
+/// Level -1 is a warning. Only a truncated file counts as an error: the rest of the picture would be grey.
 void note(j_common_ptr jpeg, int level) {
   if (level < 0 && jpeg->err->msg_code == JWRN_JPEG_EOF) throw_jpeg_error(jpeg);
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files as cameras and paint programs write them, with EXIF data and ICC profiles, opened from many threads at once, in
-// processes that never opened one before: OpenImageIO 2.4 decodes both into tables of its own without a lock (its issue
-// 3756). Without ours, 8 of 40 such processes crashed on two processors. The profiles hold tags that it does not know,
-// each of which it adds to a table.
+// Files as cameras and paint programs write them, with EXIF data and ICC profiles, opened by many threads at once in
+// processes that have not opened one before: OpenImageIO 2.4 decodes both into shared tables without a lock (its issue
+// 3756). Without our lock, 8 of 40 such processes crashed on two processors. Each profile holds tags unknown to
+// OpenImageIO, which it adds to a table.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -26,14 +26,14 @@ using test_support::test_file;
 constexpr int kFiles = 8;  // of each format
 constexpr int kTags = 3000;
 
-/// `value` in `n_bytes` bytes, the highest first.
+/// `value` as `n_bytes` bytes, big-endian.
 std::string big_endian(uint32_t value, int n_bytes = 4) {
   std::string bytes;
   for (int i = n_bytes - 1; i >= 0; --i) bytes += static_cast<char>(value >> (8 * i));
   return bytes;
 }
 
-/// A camera's make, its model's version, the place of the picture: directories of EXIF, in the order of Motorola.
+/// EXIF directories with camera make, EXIF version and GPS data, in Motorola (big-endian) byte order.
 std::string exif() {
   const auto entry = [](uint32_t tag, uint32_t type, uint32_t count, const std::string& value) {
     return big_endian(tag, 2) + big_endian(type, 2) + big_endian(count) + value;
@@ -46,7 +46,7 @@ std::string exif() {
          big_endian(1, 2) + entry(0, 1, 4, std::string("\2\3\0\0", 4)) + big_endian(0);
 }
 
-/// A colour profile with tags that no other number's has.
+/// A colour profile with tags that no other number's profile has.
 std::string profile(int number) {
   std::string tags = big_endian(kTags);
   const uint32_t body = 128 + 4 + 12 * kTags;
@@ -80,7 +80,7 @@ std::string png(int number) {
          chunk("IDAT", packed(std::string("\0abc", 4))) + chunk("IEND", "");
 }
 
-/// Puts the metadata after the first marker of a JPEG file.
+/// Inserts the metadata after the first marker of a JPEG file.
 std::string jpeg(int number) {
   const std::vector<uint8_t> grey(3, 128);
   ImageToEncode image{1, 1};
@@ -94,7 +94,7 @@ std::string jpeg(int number) {
          std::string(plain.begin() + 2, plain.end());
 }
 
-/// What a new process with this work ends with: 0, or as waitpid() tells it.
+/// Runs `work` in a new process; returns 0, or the status that waitpid() gives.
 int end_of_process(const std::function<void()>& work) {
   const pid_t child = fork();
   if (child == 0) {
@@ -132,7 +132,7 @@ TEST(Metadata, IsDecodedByOneThreadAtATime) {
   std::vector<std::string> paths;
   for (int i = 0; i < kFiles; ++i)
     for (const char* extension : {"png", "jpg"}) paths.push_back(test_file(std::to_string(i) + "." + extension));
-  // This process must not load OpenImageIO, or the others would not be new.
+  // This process must not load OpenImageIO, or its children would not start fresh.
   ASSERT_EQ(end_of_process([&] {
               for (size_t i = 0; i < paths.size(); ++i) {
                 const int number = static_cast<int>(i);

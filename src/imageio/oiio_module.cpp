@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The module libcovary_imageio.so: image_io.h by OpenImageIO.
+// The module libcovary_imageio.so: implements image_io.h with OpenImageIO.
 #include <OpenImageIO/imageio.h>
 #include <sys/mman.h>
 #include <unistd.h>
@@ -17,16 +17,15 @@
 namespace covary {
 namespace {
 
-/// OpenImageIO's message as one line.
+/// OpenImageIO's message on one line.
 std::string one_line(std::string text) {
   text.erase(text.find_last_not_of(" \n") + 1);
   for (size_t at = text.find('\n'); at != std::string::npos; at = text.find('\n', at)) text.replace(at, 1, "; ");
   return text.empty() ? "OpenImageIO gives no reason" : text;
 }
 
-/// Held while OpenImageIO opens or closes a file or writes one: version 2.4 decodes EXIF, ICC and XMP into tables that
-/// all threads share, and adds to them without a lock whatever it finds in a file (its issue 3756). Pixels are read
-/// without it.
+/// Held while OpenImageIO opens, closes or writes a file: version 2.4 decodes EXIF, ICC and XMP into tables shared by
+/// all threads, and adds to them without a lock (its issue 3756). Pixels are read without it.
 std::mutex& metadata_mutex() {
   static std::mutex mutex;
   return mutex;
@@ -65,7 +64,7 @@ class OiioReader final : public ImageReader {
   }
   bool read_as(const Part& part, OIIO::TypeDesc type, void* values, std::string& problem) {
     std::unique_lock lock(metadata_mutex(), std::defer_lock);
-    if (part.first_row < next_row_) lock.lock();  // some formats open the file again to go back
+    if (part.first_row < next_row_) lock.lock();  // some formats reopen the file to go back
     next_row_ = part.first_row + part.n_rows;
     const int y = input_->spec().y + part.first_row;
     try {
@@ -84,7 +83,7 @@ class OiioReader final : public ImageReader {
   int next_row_ = 0;
 };
 
-/// A file without a place on a device. (OpenImageIO's own files in memory do not work for TIFF.)
+/// A file in memory. (OpenImageIO's own do not work for TIFF.)
 class MemoryFile {
  public:
   explicit MemoryFile(const std::string& name) : file_(memfd_create(name.c_str(), MFD_CLOEXEC)) {
@@ -111,7 +110,7 @@ class OiioModule final : public ImageModule {
     const std::lock_guard lock(metadata_mutex());
     try {
       OIIO::ImageSpec config;
-      config.attribute("oiio:UnassociatedAlpha", 1);  // do not multiply colours by alpha
+      config.attribute("oiio:UnassociatedAlpha", 1);  // do not premultiply by alpha
       if (colours == OtherColours::kKeep) config.attribute("oiio:RawColor", 1);
       auto input = OIIO::ImageInput::open(path, &config);
       if (!input) {

@@ -16,7 +16,7 @@ void convert(const uint8_t* from, To& to) {
   std::memcpy(&value, from, sizeof(From));
   if constexpr (std::is_same_v<From, To>)
     to = value;
-  else  // as OpenImageIO does it
+  else  // as OpenImageIO does
     to = static_cast<float>(value) * (1.0f / static_cast<float>(std::numeric_limits<From>::max()));
 }
 
@@ -51,7 +51,7 @@ class PlainReader final : public ImageReader {
     return false;
   }
 
-  /// The whole image; the file is opened anew.
+  /// Reads the whole image; opens the file again.
   template <typename From, typename To>
   bool read_as(const Part& part, To* values, std::string& problem) {
     try {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// PNG, JPEG and HDR files as textures read them, against OpenImageIO's reading: the same bits.
+// PNG, JPEG and HDR textures are read to the same bits as by OpenImageIO.
 #include "imageio/plain_rows.h"
 
 #include <gtest/gtest.h>
@@ -121,7 +121,7 @@ TEST(PlainRows, HdrIsWhatOpenImageIoReads) {
   }
 }
 
-/// Textures are read by these; what they leave is left to OpenImageIO.
+/// Damaged files and other formats are left to OpenImageIO.
 TEST(PlainRows, DamagedFilesAreNamedAndOthersLeft) {
   const TemporaryFolder folder;
   const std::vector<uint8_t> values = noise(size_t{64} * 64 * 3);

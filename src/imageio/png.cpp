@@ -13,8 +13,8 @@
 namespace covary {
 namespace {
 
-// libpng leaves by its error function, which must not return. The exception passes through libpng, which holds nothing
-// that would have to be released on the way; the destructors below release its structures.
+// libpng requires that its error function does not return. The exception unwinds through libpng, which holds nothing
+// that needs freeing on the way; the destructors below free its structures.
 [[noreturn]] void throw_png_error(png_structp, png_const_charp message) {
   throw Error(ErrorCode::kIo, std::string("PNG: ") + message);
 }
@@ -50,7 +50,7 @@ struct Reader {
   png_infop info = nullptr;
 };
 
-/// A file whose rows are read from the top down as grey or RGB of 8 or 16 bits, with alpha where it has some.
+/// A file read row by row from the top as grey or RGB of 8 or 16 bits, with alpha if present.
 class PngRows final : public PlainRows {
  public:
   explicit PngRows(std::FILE* file) {
@@ -59,8 +59,8 @@ class PngRows final : public PlainRows {
     png_read_info(png, reader_.info);
     if (png_get_interlace_type(png, reader_.info) != PNG_INTERLACE_NONE)
       throw Error(ErrorCode::kInput, "it is interlaced");
-    png_set_expand(png);  // palettes, fewer than 8 bits, one colour that is transparent
-    png_set_swap(png);    // 16 bits have the upper ones first
+    png_set_expand(png);  // palettes, fewer than 8 bits, a transparent colour key
+    png_set_swap(png);    // PNG stores 16-bit values big-endian
     png_read_update_info(png, reader_.info);
     width = static_cast<int>(png_get_image_width(png, reader_.info));
     height = static_cast<int>(png_get_image_height(png, reader_.info));
@@ -89,7 +89,7 @@ std::vector<unsigned char> encode_png(int width, int height, const std::vector<u
                PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_set_sRGB(writer.png, writer.info, PNG_sRGB_INTENT_PERCEPTUAL);
   for (const auto& [key, value] : texts) {
-    std::string keyword = key, text = value;  // libpng wants texts it may write to
+    std::string keyword = key, text = value;  // libpng takes non-const text
     png_text chunk{};
     chunk.compression = PNG_ITXT_COMPRESSION_NONE;
     chunk.key = keyword.data(), chunk.text = text.data(), chunk.itxt_length = text.size();

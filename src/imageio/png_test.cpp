@@ -29,7 +29,7 @@ TEST(Png, IsReadBackByAnotherLibrary) {
   EXPECT_EQ(reader->header().width, 5);
   EXPECT_EQ(reader->header().height, 4);
   const std::string space = reader->header().attributes.at("oiio:ColorSpace");
-  EXPECT_TRUE(space == "sRGB" || space == "srgb_rec709_scene") << space;  // of OpenImageIO 2, 3
+  EXPECT_TRUE(space == "sRGB" || space == "srgb_rec709_scene") << space;  // OpenImageIO 2, 3
   EXPECT_EQ(reader->read_bytes(0, 3), rgb);
 }
 
