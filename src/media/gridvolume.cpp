@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// gridvolume: values on a grid, from one of Mitsuba's volume files.
+// gridvolume: values on a grid, read from Mitsuba's volume files.
 //
 // | name          | type      | default   | meaning                                                              |
 // |---------------|-----------|-----------|----------------------------------------------------------------------|
@@ -40,7 +40,7 @@ class GridVolume final : public Volume {
   }
 
   Spectrum eval(const Vec3& p) const override {
-    // Cell i along an axis has its centre at (i + 1/2) / size, as texels of textures.
+    // Cell i along an axis is centred at (i + 1/2) / size, like texels.
     const Vec3 local = to_grid_.point(p);
     int low[3], high[3];
     float t[3];
@@ -62,7 +62,7 @@ class GridVolume final : public Volume {
   Bounds3 bounds() const override { return bounds_; }
 
  private:
-  static constexpr float kFar = 1e6f;  // of the unit cube; keeps indices within their type
+  static constexpr float kFar = 1e6f;  // in unit cubes; keeps indices within the range of int
 
   int wrapped(int64_t i, int n) const {
     if (wrap_ == Wrap::kClamp) return static_cast<int>(std::clamp<int64_t>(i, 0, n - 1));
@@ -89,7 +89,7 @@ class GridVolume final : public Volume {
   Wrap wrap_;
 };
 
-/// From the unit cube to the box.
+/// Maps the unit cube to the box.
 Transform over(const Bounds3& box) { return Transform::translate(box.lower) * Transform::scale(box.upper - box.lower); }
 
 }  // namespace

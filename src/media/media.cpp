@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// homogeneous: the same extinction everywhere. heterogeneous: one that varies, inside the box around its volume.
+// homogeneous: constant extinction. heterogeneous: varying extinction inside the box around its volume.
 //
 // | name           | type          | default | meaning                                                            |
 // |----------------|---------------|---------|--------------------------------------------------------------------|
@@ -25,7 +25,7 @@
 namespace covary {
 namespace {
 
-/// The same value everywhere. Its box is the unit cube moved by `to_world`, as in Mitsuba.
+/// The same value everywhere in its box, the unit cube moved by `to_world`, as in Mitsuba.
 class ConstantVolume final : public Volume {
  public:
   explicit ConstantVolume(const Spectrum& value, const Transform& to_world = {})
@@ -41,12 +41,13 @@ class ConstantVolume final : public Volume {
   Bounds3 bounds_;
 };
 
-/// Collisions of a ray with a medium of varying extinction, at most: more would take too long, or no ray would move.
+/// Upper bound on collisions along a ray in a heterogeneous medium: beyond it, tracking would take too long, or steps
+/// would vanish in rounding.
 constexpr float kMostCollisions = 1e6f;
 
 bool not_negative(const Spectrum& s) { return is_finite(s) && s.r >= 0 && s.g >= 0 && s.b >= 0; }
 
-/// A volume; numbers and colours are constant ones. Null after recording an error.
+/// The volume parameter; numbers and colours become constant volumes. Null after recording an error.
 VolumePtr volume(Parameters& p, const std::string& name, float fallback, SpectrumRole role) {
   if (p.holds_object(name)) return std::dynamic_pointer_cast<const Volume>(p.find_object(name, "volume"));
   return std::make_shared<ConstantVolume>(p.get_spectrum(name, Spectrum(fallback), role));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What media are made of, and what is wrong with them.
+// Parameters of media and their errors.
 #include <gtest/gtest.h>
 
 #include "media/registry.h"

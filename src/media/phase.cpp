@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// isotropic: all directions are equally likely. It has no parameters.
+// isotropic: uniform over the sphere. No parameters.
 //
-// rayleigh: particles much smaller than the wavelength, after Rayleigh (Strutt 1871). It has no parameters.
+// rayleigh: scattering by particles much smaller than the wavelength (Strutt 1871). No parameters.
 //
-// hg: more light goes forwards or backwards [HenyeyGreenstein1941].
+// hg: forward or backward scattering [HenyeyGreenstein1941].
 //
 // | name | type  | default | meaning                                                                      |
 // |------|-------|---------|------------------------------------------------------------------------------|
@@ -29,7 +29,7 @@ class Rayleigh final : public PhaseFunction {
  public:
   float pdf(const Vec3& d, const Vec3& w) const override { return 3 / (16 * kPi) * (1 + sqr(dot(d, w))); }
   Vec3 sample(const Vec3& d, Vec2 u) const override {
-    // The distribution function is a cubic polynomial in the cosine, inverted by Cardano's formula.
+    // The CDF is a cubic polynomial in the cosine, inverted by Cardano's formula.
     const double z = 4.0 * u.x - 2, root = std::sqrt(z * z + 1);
     const float cosine = std::clamp(static_cast<float>(std::cbrt(z + root) + std::cbrt(z - root)), -1.0f, 1.0f);
     const float r = safe_sqrt(1 - cosine * cosine);
@@ -43,7 +43,8 @@ class HenyeyGreenstein final : public PhaseFunction {
   explicit HenyeyGreenstein(float g) : g_(g) {}
 
   float pdf(const Vec3& d, const Vec3& w) const override {
-    // [HenyeyGreenstein1941] (1 - g²) / (4π (1 + g² - 2 g cos)^1.5); the base as a sum of what is not negative.
+    // [HenyeyGreenstein1941] (1 - g²) / (4π (1 + g² - 2 g cos)^1.5), with the base written as a sum of non-negative
+    // terms.
     const float base = g_ >= 0 ? sqr(1 - g_) + g_ * length_squared(d - w) : sqr(1 + g_) - g_ * length_squared(d + w);
     return (1 - g_ * g_) / (4 * kPi * base * std::sqrt(base));
   }
@@ -55,9 +56,9 @@ class HenyeyGreenstein final : public PhaseFunction {
   }
 
  private:
-  /// The distribution function inverted.
+  /// Inverse CDF.
   float cosine(float u) const {
-    if (std::abs(g_) < 1e-3f) {  // to first order in g, where the formula divides by it
+    if (std::abs(g_) < 1e-3f) {  // first-order series in g, where the closed form divides by g
       const float z = 1 - 2 * u;
       return std::clamp(z + 1.5f * g_ * (1 - z * z), -1.0f, 1.0f);
     }
@@ -74,7 +75,7 @@ std::shared_ptr<PhaseFunction> make_isotropic(Parameters&) { return std::make_sh
 std::shared_ptr<PhaseFunction> make_rayleigh(Parameters&) { return std::make_shared<Rayleigh>(); }
 
 std::shared_ptr<PhaseFunction> make_hg(Parameters& p) {
-  constexpr float kLargest = 0.9999f;  // beyond it floats cannot tell the forward directions apart
+  constexpr float kLargest = 0.9999f;  // beyond it, floats cannot resolve the forward directions
   return std::make_shared<HenyeyGreenstein>(p.get_float("g", 0.8f, -kLargest, kLargest));
 }
 

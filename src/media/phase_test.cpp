@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Phase functions draw what they say: chi-square tests with N = 400 000 at alpha = 5e-7 (statistics/chi2.h), which find
-// an rms error of 2 % of the density; a planted one of a slightly different asymmetry must be found.
+// Phase functions sample their densities: chi-square tests with N = 400 000 at alpha = 5e-7 (statistics/chi2.h), which
+// detect an rms error of 2 % of the density; a planted density of slightly different asymmetry must be rejected.
 #include <gtest/gtest.h>
 
 #include "media/registry.h"
@@ -40,7 +40,7 @@ TEST(PhaseFunctions, AnotherAsymmetryIsFound) {
   EXPECT_FALSE(compare(*hg(0.3), *hg(-0.3), kDirection).accepted);
 }
 
-/// Twice as much goes forwards and backwards as to the sides.
+/// Forward and backward scattering is twice as likely as sideways.
 TEST(PhaseFunctions, RayleighHasItsShape) {
   const auto rayleigh = make_plugin<PhaseFunction>(phase_plugins(), "phase", "rayleigh", {}).object;
   const auto isotropic = make_plugin<PhaseFunction>(phase_plugins(), "phase", "isotropic", {}).object;

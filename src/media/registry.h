@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Media, phase functions and volumes by the names scene files use. A new one: a word in registry.cpp, a file in CMake.
+// Media, phase functions and volumes by the names used in scene files. To add one: a line in registry.cpp, a file in
+// CMake.
 #pragma once
 
 #include <span>
@@ -9,12 +10,12 @@
 
 namespace covary {
 
-/// All of a kind, sorted by name.
+/// All plugins of a kind, sorted by name.
 std::span<const Plugin<Medium>> medium_plugins();
 std::span<const Plugin<PhaseFunction>> phase_plugins();
 std::span<const Plugin<Volume>> volume_plugins();
 
-/// What a medium has that names none.
+/// The phase function of media that specify none.
 PhasePtr isotropic_phase();
 
 }  // namespace covary

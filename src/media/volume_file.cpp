@@ -29,7 +29,7 @@ T at(const char* header, size_t place) {
   return value;
 }
 
-/// What the header says; the values are not read.
+/// Parses the header, not the values.
 VolumeFile parse_header(const std::string& path, const char* header, size_t n_bytes) {
   const auto refuse = [&](const std::string& what) { return Error(ErrorCode::kInput, path + ": " + what); };
   if (n_bytes < kHeaderBytes || std::memcmp(header, "VOL", 3) != 0)

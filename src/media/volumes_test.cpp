@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Volumes: values between cells and outside the grid, and what is wrong with a file.
+// Volumes: interpolation between cells, wrap modes outside the grid, errors in files.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -67,7 +67,7 @@ TEST(GridVolume, WrapModesSayWhatLiesOutside) {
   EXPECT_EQ(at("mirror", -0.3f), 1);
   EXPECT_EQ(at("mirror", 1.3f), 2);
   EXPECT_EQ(at("mirror", 1.7f), 1);
-  EXPECT_EQ(at("repeat", 1e30f), at("repeat", 1e30f));  // far away: some value, no trap
+  EXPECT_EQ(at("repeat", 1e30f), at("repeat", 1e30f));  // far away: some value, no undefined behaviour
 }
 
 TEST(GridVolume, ThreeChannelsAreColours) {
@@ -82,7 +82,7 @@ TEST(GridVolume, LiesWhereTheTransformAndTheFileSay) {
   EXPECT_FLOAT_EQ(moved->eval({11.5f, 0.5f, 1 / 6.0f}).g, 2);
   EXPECT_EQ(moved->bounds().lower, Vec3(10, 0, 0));
   EXPECT_EQ(moved->bounds().upper, Vec3(12, 1, 1));
-  const VolumePtr boxed = grid(kGrey, {{"use_grid_bbox", true}});  // the files of volume_text() say [-1, 1]³
+  const VolumePtr boxed = grid(kGrey, {{"use_grid_bbox", true}});  // volume_text() writes the box [-1, 1]³
   EXPECT_FLOAT_EQ(boxed->eval({-0.5f, 0, -2 / 3.0f}).g, 1);
   EXPECT_EQ(boxed->bounds().lower, Vec3(-1, -1, -1));
 }
@@ -105,7 +105,7 @@ TEST(VolumeFile, EveryDefectIsNamed) {
   EXPECT_TRUE(contains(message(changed(20, 6)), "has 6 channels; expected 1 or 3"));
   EXPECT_TRUE(contains(message(kGrey + "x"), "has 73 bytes; a grid of 2 x 1 x 3 cells with 1 channels has 72"));
   EXPECT_TRUE(contains(message(kGrey.substr(0, 71)), "has 71 bytes"));
-  // The largest header: no memory is taken for what the file has not.
+  // The largest header: no allocation beyond the size of the file.
   std::string huge = kGrey;
   for (const size_t place : {8, 12, 16}) {
     const int most = 1 << 20;
