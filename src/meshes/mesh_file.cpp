@@ -12,10 +12,10 @@
 namespace covary {
 namespace {
 
-/// Triangles whose normals are found at once, in parallel, before they are added in their order.
+/// Number of triangles whose normals are computed in parallel before they are summed sequentially, in order.
 constexpr size_t kBlock = size_t{1} << 16;
 
-/// The normal of a triangle times the angle at each of its corners; zero where it has no area.
+/// The triangle's normal weighted by the angle at each corner; zero if its area is zero.
 std::array<Vec3, 3> normals_by_angle(const MeshData& mesh, const std::array<uint32_t, 3>& t) {
   const Vec3 p[3] = {mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]};
   const Vec3 normal = cross(p[1] - p[0], p[2] - p[0]);
@@ -30,7 +30,7 @@ std::array<Vec3, 3> normals_by_angle(const MeshData& mesh, const std::array<uint
   return parts;
 }
 
-/// One normal per point, weighted by angles; zero where no triangle of positive area meets the point.
+/// Angle-weighted normal per point; zero if no triangle of positive area meets the point.
 std::vector<Vec3> smooth_normals(const MeshData& mesh, const std::vector<uint32_t>& points) {
   const auto point_of = [&](uint32_t vertex) { return points.empty() ? vertex : points[vertex]; };
   const size_t n_points =

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The three mesh formats and what happens to a mesh on its way into the scene.
+// The three mesh formats and the placement of a mesh in the scene.
 #include <gtest/gtest.h>
 #include <zlib.h>
 
@@ -77,7 +77,7 @@ void expect_square(const MeshFile& file) {
   EXPECT_TRUE(file.points.empty());
 }
 
-/// The same square in a binary layout with other types: double positions, short tag, uint indices counted by an int.
+/// The same square in a binary layout with other types: double positions, short tag, uint indices with an int count.
 std::string binary_square(bool swap) {
   std::string text =
       std::string("ply\nformat binary_") + (swap ? "big" : "little") +
@@ -100,7 +100,7 @@ std::string binary_square(bool swap) {
   return text;
 }
 
-/// The layout nearly all files have, `n_faces` triangles over `n_vertices` vertices.
+/// The most common layout, `n_faces` triangles over `n_vertices` vertices.
 std::string plain_ply(const std::vector<Vec3>& vertices, const std::vector<Triangle>& faces) {
   std::string text = "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(vertices.size()) +
                      "\nproperty float x\nproperty float y\nproperty float z\nelement face " +
@@ -142,7 +142,7 @@ TEST(PlyReader, TakesPolygonsInThePlainLayoutApart) {
   text.replace(text.find("face 0"), 6, "face 3");
   append(text, uint8_t{5});
   for (uint32_t k = 0; k < 5; ++k) append(text, k);
-  append(text, uint8_t{2});  // an edge: no area
+  append(text, uint8_t{2});  // degenerate: two vertices
   append(text, 0u), append(text, 1u);
   append(text, uint8_t{3});
   append(text, Triangle{2, 1, 0});
@@ -199,7 +199,7 @@ TEST(PlyReader, ReportsEveryTruncation) {
        {plain_ply({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}), binary_square(false), binary_square(true)})
     for (size_t length = 0; length < text.size(); ++length)
       EXPECT_EQ(ply_error(text.substr(0, length)).substr(0, 5), "PLY: ") << length;
-  // An ascii file is complete without its last line end and the elements nobody needs.
+  // An ascii file is complete even without its last newline and trailing elements that are not used.
   EXPECT_EQ(ply_error(kAsciiSquare.substr(0, kAsciiSquare.find("4 0 1 2 3") + 5)),
             "PLY: the file ends, or a number cannot be read, in face 0 of 1");
 }
@@ -364,7 +364,7 @@ TEST(SerializedReader, ReportsWrongFiles) {
   EXPECT_EQ(error(serialized_body<float>(4, 5, 1ull << 40)),
             "serialized: the header promises 1099511627776 vertices and 1 triangles, more than the file can hold");
   EXPECT_EQ(error(serialized_body<float>(4, 5, 4)), "serialized: the compressed data is truncated or damaged");
-  // Without vertices the indices are what follows the header: the bits of the first position, 5.
+  // With no vertices, the indices are read from the bytes after the header: the bits of the first position, 5.
   EXPECT_EQ(error(serialized_body<float>(4, 5, 0)),
             "triangle 0 uses vertex " + std::to_string(std::bit_cast<uint32_t>(5.0f)) + ", but there are only 0");
   std::string many = good;
@@ -424,7 +424,7 @@ TEST(PlaceMesh, DropsNormalsForFlatShading) {
 TEST(PlaceMesh, TransformsPositionsAndNormals) {
   MeshFile file;
   file.mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 1}};
-  file.mesh.normals.assign(3, {0, -2, 2});  // of any length
+  file.mesh.normals.assign(3, {0, -2, 2});  // not normalised
   file.mesh.triangles = {{0, 1, 2}};
   MeshPlacement placement;
   placement.to_world = Transform::translate({1, 2, 3}) * Transform::scale({1, 1, 3});

@@ -16,7 +16,7 @@ namespace {
 
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 
-/// One line, read from left to right.
+/// Parses one line from left to right.
 class Line {
  public:
   Line(std::string_view text, size_t number) : p_(text.data()), end_(p_ + text.size()), number_(number) {}
@@ -48,11 +48,12 @@ class Line {
       p_ = start;
       fail(fmt::format("'{}' is not a number", word()));
     }
-    // from_chars leaves the value alone when it is out of range: too small is 0, too large is found by check_mesh().
+    // from_chars leaves the value alone when it is out of range: strtod gives 0 on underflow, and infinity, which
+    // check_mesh() rejects, on overflow.
     if (error == std::errc::result_out_of_range) value = std::strtod(std::string(start, rest).c_str(), nullptr);
     return static_cast<float>(value);
   }
-  /// Index in "a/b/c"; kNone when empty. `count`: how many there are so far, for negative ones.
+  /// Index in "a/b/c"; kNone if empty. `count`: number of elements so far, for negative indices.
   uint32_t index(size_t count, const char* what) {
     if (at_blank() || *p_ == '/') return kNone;
     int64_t value = 0;
@@ -105,8 +106,8 @@ class ObjReader {
   }
 
  private:
-  /// The line at `start`, and those that follow while a backslash ends the line before; `joined` holds them then.
-  /// `start` and `number` go on to the next line.
+  /// The line at `start`, joined (in `joined`) with the lines after it while it ends in a backslash. Advances `start`
+  /// and `number` to the next line.
   static std::string_view next_line(std::string_view text, size_t& start, size_t& number, std::string& joined) {
     joined.clear();
     while (true) {
@@ -125,7 +126,7 @@ class ObjReader {
     }
   }
 
-  /// A vertex made so far; those of one position form a chain.
+  /// A vertex created so far; vertices with the same position form a chain.
   struct Vertex {
     uint32_t uv, normal, next;
   };

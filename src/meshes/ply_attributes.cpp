@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names of attributes in PLY files are Mitsuba's: properties that share a prefix are channels of one attribute.
+// Names of attributes in PLY files follow Mitsuba: properties with a common prefix are channels of one attribute.
 #include "meshes/ply_attributes.h"
 
 #include <algorithm>
@@ -14,7 +14,7 @@ PlyProperty* find(PlyElement& element, const std::string& name) {
   return nullptr;
 }
 
-/// The properties that make up the attribute, none where they are not there.
+/// The properties that make up the attribute; empty if they are absent.
 std::vector<PlyProperty*> channels_of(PlyElement& element, const std::string& prefix) {
   static const char* const kSuffixes[][3] = {{"0", "1", "2"}, {"1", "2", "3"}, {"x", "y", "z"}, {"r", "g", "b"}};
   const auto all = [&](const std::string& a, const std::string& b, const std::string& c) {
@@ -43,7 +43,7 @@ void assign_attributes(PlyElement& element, std::span<const std::string> wanted,
     const std::vector<PlyProperty*> channels = channels_of(element, name.substr(kind.size()));
     if (channels.empty()) continue;
     for (size_t c = 0; c < channels.size(); ++c) {
-      if (channels[c]->attribute >= 0) continue;  // of another one already
+      if (channels[c]->attribute >= 0) continue;  // already belongs to another attribute
       channels[c]->attribute = static_cast<int>(mesh.attributes.size()), channels[c]->channel = static_cast<int>(c);
     }
     mesh.attributes.push_back({name, element.name == "face", static_cast<int>(channels.size()), {}});

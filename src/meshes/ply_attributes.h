@@ -9,8 +9,8 @@
 
 namespace covary {
 
-/// Marks the properties of the vertices or faces that are channels of the wanted attributes, and adds these to the
-/// mesh, still without values. Colours of vertices are not among them: they have slots of their own.
+/// Marks the vertex or face properties that are channels of the wanted attributes, and adds those attributes to the
+/// mesh without values yet. Excludes vertex colours, which have slots of their own.
 void assign_attributes(PlyElement& element, std::span<const std::string> wanted, MeshData& mesh);
 
 }  // namespace covary

@@ -15,7 +15,7 @@ inline size_t size_of(PlyType type) {
   return kSizes[static_cast<size_t>(type)];
 }
 
-/// Where a vertex property goes; kSkip: nowhere.
+/// What a vertex property holds; kSkip: unused.
 enum PlySlot : int8_t { kX, kY, kZ, kNx, kNy, kNz, kU, kV, kR, kG, kB, kSlots, kSkip = -1 };
 
 struct PlyProperty {
@@ -24,7 +24,7 @@ struct PlyProperty {
   bool is_list = false;
   PlyType count_type = PlyType::kUint8;
   PlySlot slot = kSkip;
-  int attribute = -1, channel = 0;  ///< which attribute of the mesh it is a channel of; -1: none
+  int attribute = -1, channel = 0;  ///< index of the mesh attribute that this is a channel of; -1: none
 };
 
 struct PlyElement {
@@ -37,7 +37,7 @@ struct PlyElement {
       if (p.is_list) return true;
     return false;
   }
-  /// Bytes of a record, lists counted as empty.
+  /// Size of a record in bytes with all lists empty.
   size_t smallest_record() const {
     size_t size = 0;
     for (const PlyProperty& p : properties) size += size_of(p.is_list ? p.count_type : p.type);
@@ -50,12 +50,12 @@ enum class PlyFormat { kAscii, kLittleEndian, kBigEndian };
 struct PlyHeader {
   PlyFormat format = PlyFormat::kAscii;
   std::vector<PlyElement> elements;
-  size_t size = 0;  ///< bytes up to the body
+  size_t size = 0;  ///< bytes before the body
 };
 
-/// Throws Error(kInput) that names the line.
+/// Throws Error(kInput) naming the line.
 PlyHeader parse_ply_header(std::string_view text);
-/// Throws the Error(kInput) of PLY files.
+/// Throws Error(kInput) with the prefix of PLY errors.
 [[noreturn]] void fail_ply(const std::string& message);
 
 }  // namespace covary

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stanford PLY. One path reads every legal layout value by value; the layout that nearly all files have (binary, little
-// endian, vertices of single-precision numbers, faces "uchar n, int index[n]") has a fast one.
+// Stanford PLY. The general path reads any legal layout value by value; the most common layout (binary little endian,
+// single-precision vertices, faces "uchar n, int index[n]") has a fast path.
 #include <fmt/format.h>
 
 #include <bit>
@@ -21,7 +21,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little);
 
-/// Gives the vertex properties their slots. Returns which groups are complete.
+/// Assigns slots to the vertex properties and records which groups are complete.
 struct Contents {
   bool normals = false, uvs = false, colours = false;
 };
@@ -51,14 +51,14 @@ Contents assign_slots(PlyElement& vertex) {
 
 // ---- body -----------------------------------------------------------------------------------------------------------
 
-/// Values of a binary body, one after the other.
+/// Reads the values of a binary body in order.
 class BinaryBody {
  public:
   BinaryBody(std::span<const std::byte> bytes, bool swap) : p_(bytes.data()), end_(p_ + bytes.size()), swap_(swap) {}
 
   size_t remaining() const { return static_cast<size_t>(end_ - p_); }
   bool swap() const { return swap_; }
-  /// Largest number of records that the rest of the file can hold.
+  /// Largest number of records that fit in the rest of the file.
   uint64_t capacity(const PlyElement& element) const {
     return remaining() / std::max<size_t>(1, element.smallest_record());
   }
@@ -119,7 +119,7 @@ class BinaryBody {
   bool swap_;
 };
 
-/// Values of an ascii body: numbers between blanks.
+/// Reads the values of an ascii body, separated by white space.
 class AsciiBody {
  public:
   explicit AsciiBody(std::string_view text) : p_(text.data()), end_(p_ + text.size()) {}
@@ -132,7 +132,8 @@ class AsciiBody {
     if (p_ < end_ && *p_ == '+') ++p_;
     const char* start = p_;
     const auto [rest, error] = std::from_chars(p_, end_, value);
-    // from_chars leaves the value alone when it is out of range: too small is 0, too large is found by check_mesh().
+    // from_chars leaves the value alone when it is out of range: strtod gives 0 on underflow, and infinity, which
+    // check_mesh() rejects, on overflow.
     if (error == std::errc::result_out_of_range) value = std::strtod(std::string(start, rest).c_str(), nullptr);
     if (error == std::errc::invalid_argument || (rest<end_&& * rest> ' ')) return false;
     if (type < PlyType::kFloat32 && value != std::floor(value)) return false;
@@ -144,7 +145,7 @@ class AsciiBody {
   const char *p_, *end_;
 };
 
-/// Largest value of integer colours.
+/// Divisor of integer colours: the maximum of the type.
 float colour_scale(PlyType type) {
   switch (type) {
     case PlyType::kUint8:
@@ -156,7 +157,7 @@ float colour_scale(PlyType type) {
   }
 }
 
-/// Sizes the arrays for `n` vertices.
+/// Resizes the arrays for `n` vertices.
 void allocate(MeshData& mesh, const Contents& contents, size_t n) {
   mesh.positions.resize(n);
   if (contents.normals) mesh.normals.resize(n);
@@ -197,13 +198,13 @@ void skip_list(Body& body, const PlyProperty& property, const PlyElement& elemen
   for (uint64_t k = 0; k < length; ++k) read_value(body, property.type, element, index);
 }
 
-/// Integers of colours are divided by their largest value.
+/// Integer colours are divided by the maximum of their type.
 float attribute_value(const PlyProperty& p, const MeshAttribute& attribute, double value) {
   const bool colour = attribute.name.find("color") != std::string::npos;
   return static_cast<float>(value) * (colour ? colour_scale(p.type) : 1);
 }
 
-/// Vertices of plain single-precision numbers in the machine's byte order. False: not that layout.
+/// Reads vertices of single-precision values only, in native byte order. False: another layout.
 bool read_float_vertices(BinaryBody& body, const PlyElement& element, const Contents& contents, MeshData& mesh) {
   if (body.swap() || element.has_lists()) return false;
   std::vector<std::pair<size_t, PlySlot>> fields;
@@ -249,7 +250,7 @@ void read_vertices(Body& body, const PlyElement& element, const Contents& conten
   }
 }
 
-/// Faces "uchar n, int index[n]" and nothing else. False: not that layout.
+/// Reads faces "uchar n, int index[n]" without other properties. False: another layout.
 bool read_plain_faces(BinaryBody& body, const PlyElement& element, MeshData& mesh) {
   if (body.swap() || element.properties.size() != 1) return false;
   const PlyProperty& list = element.properties[0];
@@ -271,7 +272,7 @@ bool read_plain_faces(BinaryBody& body, const PlyElement& element, MeshData& mes
   return true;
 }
 
-/// The values of a face for each of its `n` triangles.
+/// Repeats the values of a face for each of its `n` triangles.
 void add_face_values(MeshData& mesh, const std::vector<std::array<float, 3>>& values, size_t n) {
   for (size_t a = 0; a < mesh.attributes.size(); ++a) {
     MeshAttribute& attribute = mesh.attributes[a];

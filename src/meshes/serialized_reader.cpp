@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mitsuba 0.x ".serialized": a sequence of meshes, each a 4-byte header followed by a zlib stream; at the end of the
-// file the offsets of all meshes and their number.
+// Mitsuba 0.x ".serialized": a sequence of meshes, each a 4-byte header and a zlib stream, followed by the offsets of
+// all meshes and their number.
 #include <fmt/format.h>
 #include <zlib.h>
 
@@ -18,7 +18,7 @@ namespace {
 
 constexpr uint16_t kMagic = 0x041c;
 enum Flags : uint32_t { kHasNormals = 0x0001, kHasUvs = 0x0002, kHasColours = 0x0008, kDoublePrecision = 0x2000 };
-/// No zlib stream is more than 1032 times as long as its compressed form.
+/// Maximum compression ratio of a zlib stream.
 constexpr uint64_t kMaxRatio = 1032;
 
 [[noreturn]] void fail(const std::string& message) { throw Error(ErrorCode::kInput, "serialized: " + message); }
@@ -31,7 +31,7 @@ T load(std::span<const std::byte> bytes, size_t offset) {
   return value;
 }
 
-/// Decompresses as it is read.
+/// Decompresses on demand.
 class Inflater {
  public:
   explicit Inflater(std::span<const std::byte> bytes) : capacity_(bytes.size() * kMaxRatio) {
@@ -43,7 +43,7 @@ class Inflater {
   Inflater(const Inflater&) = delete;
   Inflater& operator=(const Inflater&) = delete;
 
-  /// Upper bound of the bytes the whole stream can hold.
+  /// Upper bound on the decompressed size of the stream in bytes.
   uint64_t capacity() const { return capacity_; }
   void read(void* to, size_t size) {
     auto* out = static_cast<Bytef*>(to);
@@ -69,7 +69,7 @@ class Inflater {
   uint64_t capacity_;
 };
 
-/// `n` numbers of the file's precision as floats.
+/// Reads `n` values of the file's precision as floats.
 std::vector<float> read_floats(Inflater& in, size_t n, bool double_precision) {
   std::vector<float> values(n);
   if (!double_precision) {
@@ -95,7 +95,7 @@ std::vector<T> read_vectors(Inflater& in, size_t n, bool double_precision) {
   return result;
 }
 
-/// The bytes from the header of mesh `shape_index` on.
+/// The bytes starting at the header of mesh `shape_index`.
 std::span<const std::byte> find_mesh(std::span<const std::byte> bytes, int shape_index, uint16_t version) {
   if (shape_index == 0) return bytes;
   const uint32_t count = bytes.size() >= 4 ? load<uint32_t>(bytes, bytes.size() - 4) : 0;
@@ -124,7 +124,7 @@ MeshFile read_serialized(std::span<const std::byte> bytes, int shape_index) {
   const uint32_t flags = in.value<uint32_t>();
   if (version == 4)
     while (in.value<char>() != '\0') {
-    }  // the name
+    }  // skips the name
   const uint64_t n_vertices = in.value<uint64_t>(), n_triangles = in.value<uint64_t>();
   const bool double_precision = (flags & kDoublePrecision) != 0;
   uint64_t numbers = 3;
