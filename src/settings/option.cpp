@@ -38,7 +38,7 @@ bool is_one_of(const std::vector<std::string>& names, const std::string& text) {
   return std::find(names.begin(), names.end(), text) != names.end();
 }
 
-/// "auto or " of a number that may be a word.
+/// "auto or " if the number can also be the word "auto".
 std::string words_before(const Option& option) {
   std::string words;
   for (const std::string& word : option.choices) words += word + " or ";
@@ -88,7 +88,7 @@ std::optional<std::string> accepted(const Option& option, const std::string& tex
 
 std::string problem_of(const Option& option, const std::string& text) {
   const std::string hint = option.type == Option::Type::kChoice ? did_you_mean(text, option.choices) : "";
-  // Of a whole number without a bound of its own, the one that the program's numbers have.
+  // A whole number without a range of its own is bounded by its type.
   const bool is_too_large = option.type == Option::Type::kWhole && !std::isfinite(option.range.high) &&
                             parse_real(text).value_or(0) >= static_cast<double>(option.most);
   const std::string most = is_too_large ? fmt::format(", at most {}", option.most) : "";

@@ -23,7 +23,7 @@ std::string with_names(const std::string& text, const Shown& shown) {
     const std::string name = text.substr(open + 1, close - open - 1);
     const bool is_name = is_option_name(name);
     result += text.substr(at, open - at) + (is_name ? shown(name) : "`" + name);
-    at = is_name ? close + 1 : close;  // the second quote may open a name
+    at = is_name ? close + 1 : close;  // the closing quote of one may open the next
   }
   return result + text.substr(at);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Texts of the library name options in backquotes: "`cv-grid` has no effect with `cv` off". Programs show them by the
-// names that their users know.
+// The library puts option names in backquotes: "`cv-grid` has no effect with `cv` off". Each front end shows them as
+// its users write them.
 #pragma once
 
 #include <string>

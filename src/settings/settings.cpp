@@ -11,7 +11,7 @@
 namespace covary {
 namespace {
 
-/// Texts by name.
+/// Values by name.
 class TextSource final : public SettingsSource {
  public:
   explicit TextSource(OptionValues values) : values_(std::move(values)) {}

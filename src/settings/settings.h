@@ -8,10 +8,10 @@
 //     s.only_if(v.steps > 1, {"fog-jitter"}, "with --fog-steps 1");
 //   }
 //
-// The function reads values wherever they were given (words of the command line, properties of a scene file, arguments
-// in Python) and, where none is given, only lists the options, with the values of the struct as defaults. Everything
-// else reads the list: command line, help, man page, completion, checks, the text of settings in films, the command
-// that repeats a sample, the options that a suite may use, Python, and the tests of the documentation.
+// The function reads values wherever they were given (command line, properties in a scene file, Python arguments);
+// where none are given it only lists the options, with the values in the struct as defaults. Everything else reads that
+// list: command line, help, man page, completion, validation, the settings text stored in films, the command that
+// replays a sample, the options that a suite may use, Python, and the tests of the documentation.
 #pragma once
 
 #include <charconv>
@@ -29,72 +29,72 @@
 
 namespace covary {
 
-/// Names of a choice and what they stand for.
+/// Names of a choice and the values they stand for.
 template <typename T>
 using Choices = std::span<const std::pair<const char*, T>>;
 
-/// What is seldom said of an option; Option says what each means.
+/// Less common properties of an option; see Option.
 struct OptionTraits {
   std::vector<std::string> aliases = {};
   OptionLevel level = OptionLevel::kExpert;
   OptionNames names = OptionNames::kValue;
-  OptionEffect effect = OptionEffect::kImage;  ///< the group's where that is more
+  OptionEffect effect = OptionEffect::kImage;  ///< raised to the effect of the group if that is larger
   std::string film = {};                       ///< see Settings::film_text()
 };
 
-/// A number that may be a word: "auto" for `value`.
+/// A word that is accepted in place of a number: "auto" for `value`.
 template <typename T>
 struct NumberWord {
   const char* word;
   T value;
 };
 
-/// Where values come from.
+/// Source of option values.
 class SettingsSource {
  public:
   virtual ~SettingsSource() = default;
-  /// The value as text, or nothing where none is given.
+  /// The value as text; nullopt if not given.
   virtual std::optional<std::string> find(const Option& option) = 0;
-  /// Whether the value is one of the caller's, who expects an effect, and not one that lies in a file.
+  /// Whether the value was given by the caller, who expects it to have an effect, rather than by a file.
   virtual bool is_of_caller(const Option& option) = 0;
-  /// From here on, only values of the caller's count.
+  /// From here on, ignores values that are not the caller's.
   virtual void leave_out_others() {}
-  /// A value that is not accepted, with what is; either throws, or takes note of it, and the setting keeps its value.
+  /// Reports a value that was not accepted: throws, or records the problem and the setting keeps its value.
   virtual void refuse(const Option& option, const std::string& problem) = 0;
-  /// Whether ranges of numbers are checked as values are read; otherwise by the settings' own validate().
+  /// Whether ranges are checked as values are read; otherwise the settings' own validate() checks them.
   virtual bool checks_ranges() const { return true; }
 };
 
 class Settings {
  public:
-  /// Reads texts. Throws Error(kUsage) "--NAME 'x': expected …" for a text that is no such value; ranges are described
-  /// here, and checked with all else by the validate() of the settings struct.
+  /// Reads texts. Throws Error(kUsage) "--NAME 'x': expected …" if a text cannot be parsed; ranges are only documented
+  /// here and checked by validate() of the settings struct.
   explicit Settings(OptionValues values = {});
   explicit Settings(SettingsSource& source) : source_(&source) {}
   ~Settings();
   Settings(const Settings&) = delete;
   Settings& operator=(const Settings&) = delete;
 
-  /// Heading in the help of the options that follow, and what all of them change.
+  /// Heading in the help for the following options, and the least effect of all of them.
   void group(const std::string& heading, OptionEffect effect = OptionEffect::kImage) {
     group_ = heading, effect_ = effect;
   }
 
-  /// Whether an option has a value that is yet to be declared, for defaults that depend on it.
+  /// Whether an option declared later has been given, for defaults that depend on it.
   bool is_given(const std::string& name);
 
-  /// Whether a flag that is yet to be declared was given which sets many options at once. A caller's takes the place of
-  /// all that a file says.
+  /// Whether a flag, declared later, that sets many options at once was given. If the caller gave it, values from files
+  /// are ignored.
   bool preset(const std::string& name);
 
-  /// Whether the flag was given.
+  /// Declares a flag; returns whether it was given.
   bool flag(const std::string& name, const std::string& help, const OptionTraits& traits = {});
   void flag(const std::string& name, bool& value, const std::string& help, const OptionTraits& traits = {}) {
     if (flag(name, help, traits)) value = true;
     set_value(value ? "on" : "");
   }
-  /// Each of these sets `value` where the option was given; before the call it holds the default, which an optional may
-  /// lack.
+  /// Each of these declares an option and sets `value` if it was given; on entry `value` is the default, which may be
+  /// absent if it is an optional.
   void on_off(const std::string& name, bool& value, const std::string& help, const OptionTraits& traits = {});
   template <typename T>
   void whole(const std::string& name, T& value, const OptionRange& range, const std::string& help,
@@ -128,13 +128,13 @@ class Settings {
     const size_t now = choose(name, names, chosen, help, traits);
     if (now < choices.size()) value = choices[now].second;
   }
-  /// One of names that are known when the program runs; the default may be a text that is none of them.
+  /// A choice among names known only at run time; the default may be none of them.
   void one_of(const std::string& name, std::string& value, const std::vector<std::string>& names,
               const std::string& help, const OptionTraits& traits = {});
-  /// Any text; `form` says what it looks like.
+  /// Any text; `form` describes its format.
   void text(const std::string& name, std::string& value, const std::string& form, const std::string& help,
             const OptionTraits& traits = {});
-  /// A text that `read(text, value)` understands; it returns what was expected otherwise, or an empty text.
+  /// A text parsed by `read(text, value)`, which returns "" on success and otherwise what was expected.
   template <typename T, typename Read>
   void text_as(const std::string& name, T& value, const std::string& form, const Read& read, const std::string& help,
                const OptionTraits& traits = {}) {
@@ -146,27 +146,27 @@ class Settings {
     if (!problem.empty()) source_->refuse(options_.back(), "'" + *given + "': expected " + problem);
     set_value(*given);
   }
-  /// Texts, one or more each time the option is given.
+  /// One or more texts each time the option is given.
   void texts(const std::string& name, std::vector<std::string>& values, const std::string& form,
              const std::string& help, const OptionTraits& traits = {});
 
-  /// For options that were declared and that other options decide on: unless `applies`, they change nothing, and giving
-  /// one of them throws Error(kUsage) "--NAME has no effect WHY", e.g. "with --penalty sample: …".
+  /// Declares that options above depend on others: unless `applies`, they have no effect, and giving one of them throws
+  /// Error(kUsage) "--NAME has no effect WHY", e.g. "with --penalty sample: …".
   void only_if(bool applies, std::span<const char* const> names, const std::string& why);
   void only_if(bool applies, std::initializer_list<const char*> names, const std::string& why) {
     only_if(applies, std::span(names.begin(), names.size()), why);
   }
 
-  /// All that were declared, in this order; the default is the value now.
+  /// All options in order of declaration; the default is the current value.
   const std::vector<Option>& options() const { return options_; }
 
-  /// The settings as films keep them, "grid=8 paper": of each option with an effect and a `film`, that format with its
-  /// value ("grid={}"), or where it has no place for one ("paper"), the word where the value is "on". Equal text, equal
-  /// settings.
+  /// The settings text stored in films, "grid=8 paper": for each option that has an effect and a `film` format, that
+  /// format with its value ("grid={}"), or, if it has no placeholder ("paper"), the word itself if the option is on.
+  /// Equal text means equal settings.
   std::string film_text() const;
 
  private:
-  /// Adds the option. The text given, or nothing where there is none that is right.
+  /// Adds the option. Returns its text if given and valid.
   std::optional<std::string> declare(Option option);
   Option made(Option::Type type, const std::string& name, const std::string& help, const OptionTraits& traits) const;
   size_t choose(const std::string& name, const std::vector<std::string>& names, size_t standard,
@@ -248,7 +248,7 @@ class Settings {
   std::vector<Option> options_;
 };
 
-/// The options of a struct that has a declare(), and what values make of it.
+/// The options of a struct that has a declare(), with the given values as defaults.
 template <typename T>
 std::vector<Option> options_of(T settings = {}) {
   Settings list;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One declaration: reading, listing, checks, options without effect, and the text in films.
+// One declaration: reading, listing, validation, options without effect, settings text in films.
 #include "settings/settings.h"
 
 #include <fmt/format.h>
