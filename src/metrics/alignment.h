@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pixels that images of one frame have in common.
+// The pixels that crops of one frame have in common.
 #pragma once
 
 #include <string>
@@ -8,14 +8,14 @@
 
 namespace covary {
 
-/// The part of `window` (of the image `path`) that `other` holds, too. Throws Error(kInput), which names both files,
-/// when the frames differ in size or nothing is common.
+/// The part of `window` (of the image `path`) that `other` covers. Throws Error(kInput) naming both files if the frames
+/// differ in size or the intersection is empty.
 CropWindow common_window(const std::string& path, const ImagePlace& place, const CropWindow& window,
                          const std::string& other_path, const ImagePlace& other);
 
-/// The pixels of `window`, which lies inside the image's own; 3 channels.
+/// The pixels in `window`, which must lie inside the image's window; 3 channels.
 Image cut(const PlacedImage& source, const CropWindow& window);
-/// The same of an image that is not needed any more: of a whole one, without a copy.
+/// The same for an expiring image: moves instead of copying if the window covers all of it.
 Image cut(PlacedImage&& source, const CropWindow& window);
 
 /// "640 x 360 at (10, 20)"

@@ -11,7 +11,7 @@
 namespace covary {
 namespace {
 
-constexpr int kBandPixels = 1 << 20;  // 12 MB for each image
+constexpr int kBandPixels = 1 << 20;  // 12 MB per image
 
 }  // namespace
 
@@ -40,7 +40,7 @@ ComparedFiles::ComparedFiles(std::span<ImageRows* const> images, const CropWindo
   band_rows_ = std::clamp(kBandPixels / std::max(width_, 1), 1, height_);
 }
 
-/// Rows that both bands hold are not read again: many formats begin anew to go back.
+/// Keeps the rows that both bands share: many formats restart from the top to go back.
 void ComparedFiles::move_to(int first_row, int n_rows, Source& source) const {
   const int kept_end = source.first + source.rows.height;
   const int n_kept = first_row >= source.first ? std::clamp(kept_end - first_row, 0, n_rows) : 0;

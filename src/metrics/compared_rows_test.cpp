@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bands of rows give bit by bit the errors of whole images.
+// Reading in bands gives the same bits as whole images.
 #include "metrics/compared_rows.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ namespace {
 
 using test_support::test_file;
 
-/// Bands of a given height, of images in memory.
+/// Images in memory, in bands of a given height.
 class Bands final : public ComparedRows {
  public:
   Bands(const Image& image, const std::vector<Image>& references, int band_rows) : sources_{&image} {
@@ -41,7 +41,7 @@ class Bands final : public ComparedRows {
   std::vector<Image> kept_;
 };
 
-/// Values of several decades, with equal ones, and some that are not finite.
+/// Values over several decades, some equal, some not finite.
 Image picture(int width, int height, uint64_t seed) {
   Image image(width, height, 3);
   for (size_t i = 0; i < image.data.size(); ++i) {
@@ -81,7 +81,7 @@ TEST(ComparedRows, BandsOfAnyHeightGiveTheSameBits) {
       }
 }
 
-/// The file is wider than the window, and high enough for three bands.
+/// The file is wider than the window and tall enough for three bands.
 TEST(ComparedRows, FilesGiveTheSameBits) {
   const int width = 2048, height = 1100;
   const CropWindow window{3, 5, 2040, 1090};

@@ -12,8 +12,8 @@
 namespace covary {
 namespace {
 
-/// sRGB colours on a path through Oklab whose lightness rises linearly from 0.10 to 0.97 while the hue turns from blue
-/// over violet and red to yellow; chroma is as large as sRGB allows, at most 0.24.
+/// sRGB colours along a path through Oklab: lightness rises linearly from 0.10 to 0.97 while the hue goes from blue
+/// through violet and red to yellow; chroma is the largest in gamut, at most 0.24.
 constexpr std::array<uint32_t, 33> kColours{
     0x020212, 0x050121, 0x0d002e, 0x170039, 0x210042, 0x2c004b, 0x380052, 0x450158, 0x53015d, 0x610060, 0x6f0162,
     0x7d0163, 0x8c0063, 0x9b0061, 0xaa015d, 0xba0258, 0xc90350, 0xd90346, 0xe80436, 0xf12927, 0xf83f10, 0xfb5701,

@@ -24,7 +24,7 @@ struct Plane {
 };
 using Planes = std::array<Plane, 3>;
 
-/// Convolution with an odd number of taps along x, then along y; borders repeat the last pixel.
+/// Separable convolution with an odd number of taps, along x, then y; borders replicate the last pixel.
 Plane convolve(const Plane& in, const std::vector<float>& kx, const std::vector<float>& ky) {
   const int rx = static_cast<int>(kx.size() / 2), ry = static_cast<int>(ky.size() / 2);
   Plane horizontal(in.width, in.height), out(in.width, in.height);
@@ -46,7 +46,7 @@ Plane convolve(const Plane& in, const std::vector<float>& kx, const std::vector<
 }
 
 using Matrix3 = std::array<std::array<float, 3>, 3>;
-/// Linear Rec. 709 RGB to XYZ with white D65 (IEC 61966-2-1), and back.
+/// Linear Rec. 709 RGB to XYZ, white point D65 (IEC 61966-2-1), and back.
 constexpr Matrix3 kXyzFromRgb{
     {{0.4123908f, 0.3575843f, 0.1804808f}, {0.2126390f, 0.7151687f, 0.0721923f}, {0.0193308f, 0.1191948f, 0.9505322f}}};
 constexpr Matrix3 kRgbFromXyz{{{3.2409699f, -1.5373832f, -0.4986108f},
@@ -60,7 +60,7 @@ Vec3 multiply(const Matrix3& m, const Vec3& v) {
 
 const Vec3 kWhite = multiply(kXyzFromRgb, {1, 1, 1});
 
-/// XYZ relative to white -> the linear opponent space Y Cx Cz, [Andersson2020] Eq. (2).
+/// XYZ relative to white to the linear opponent space Y Cx Cz, [Andersson2020] Eq. (2).
 Vec3 opponent(const Vec3& rgb) {
   const Vec3 xyz = multiply(kXyzFromRgb, rgb);
   const Vec3 n{xyz.x / kWhite.x, xyz.y / kWhite.y, xyz.z / kWhite.z};
@@ -72,7 +72,7 @@ Vec3 rgb_from_opponent(const Vec3& o) {
   return multiply(kRgbFromXyz, {(y + o.y / 500) * kWhite.x, y * kWhite.y, (y - o.z / 200) * kWhite.z});
 }
 
-/// CIELAB, chroma scaled with lightness for the Hunt effect: [Andersson2020] Eq. (5).
+/// CIELAB with chroma scaled by lightness for the Hunt effect: [Andersson2020] Eq. (5).
 Vec3 hunt_lab(const Vec3& rgb) {
   const Vec3 xyz = multiply(kXyzFromRgb, rgb);
   const auto f = [](float t) {
@@ -87,7 +87,7 @@ Vec3 hunt_lab(const Vec3& rgb) {
 /// Distance for large colour differences, [Andersson2020] Eq. (6).
 float hyab(const Vec3& a, const Vec3& b) { return std::abs(a.x - b.x) + std::hypot(a.y - b.y, a.z - b.z); }
 
-/// A contrast sensitivity function as a filter: the sum of two Gaussians a sqrt(pi/b) exp(-pi^2 x^2 / b), x in degrees.
+/// Contrast sensitivity function as a filter: a sum of two Gaussians a sqrt(pi/b) exp(-pi^2 x^2 / b), x in degrees.
 struct Sensitivity {
   double a1, b1, a2, b2;
 };
@@ -95,7 +95,7 @@ constexpr std::array<Sensitivity, 3> kSensitivity{{{1, 0.0047, 0, 1e-5},        
                                                    {1, 0.0053, 0, 1e-5},         // red-green
                                                    {34.1, 0.04, 13.5, 0.025}}};  // blue-yellow, [Andersson2020] Table 1
 
-/// Filters one opponent channel by its sensitivity; each Gaussian is separable, and together they sum to one.
+/// Filters an opponent channel by its contrast sensitivity; each Gaussian is separable, and the kernel sums to one.
 Plane filter_by_sensitivity(const Plane& in, const Sensitivity& s, double pixels_per_degree) {
   // All channels share the radius of the widest Gaussian.
   const int radius = static_cast<int>(std::ceil(3 * std::sqrt(0.04 / (2 * kPiD * kPiD)) * pixels_per_degree));
@@ -122,7 +122,7 @@ Plane filter_by_sensitivity(const Plane& in, const Sensitivity& s, double pixels
   return out;
 }
 
-/// Strengths of edges (first derivative) and of points and lines (second derivative).
+/// Responses to edges (first derivative) and to points and lines (second derivative).
 struct Features {
   Plane edge, point;
 };
@@ -135,7 +135,7 @@ Features features(const Plane& luminance, double pixels_per_degree) {
     const double g = std::exp(-0.5 * i * i / (sigma * sigma));
     smooth.push_back(g), first.push_back(-i * g), second.push_back((i * i / (sigma * sigma) - 1) * g);
   }
-  // Positive weights are scaled to sum to one, negative ones to minus one.
+  // Positive weights are normalised to sum to 1, negative ones to -1.
   const auto normalise = [](const std::vector<double>& kernel) {
     double positive = 0, negative = 0;
     for (double k : kernel) (k > 0 ? positive : negative) += k;
@@ -152,7 +152,7 @@ Features features(const Plane& luminance, double pixels_per_degree) {
           magnitude(convolve(luminance, d2, s), convolve(luminance, s, d2))};
 }
 
-/// What FLIP compares: perceived colours after filtering, and features.
+/// What FLIP compares: filtered colours in a perceptually uniform space, and features.
 struct Perceived {
   Image lab;
   Features features;
@@ -179,7 +179,7 @@ Perceived perceive(const Image& image, double pixels_per_degree) {
   return {std::move(lab), features(luminance, pixels_per_degree)};
 }
 
-/// [Andersson2020] Sec. 4.1.3: a power of the distance, then the range compressed above a share of the largest one.
+/// [Andersson2020] Sec. 4.1.3: a power of the distance, compressed above a fraction of the largest distance.
 float colour_difference(const Vec3& a, const Vec3& b) {
   constexpr float kPower = 0.7f, kKnee = 0.4f, kValueAtKnee = 0.95f;
   static const float largest = std::pow(hyab(hunt_lab({0, 1, 0}), hunt_lab({0, 0, 1})), kPower);
@@ -193,7 +193,7 @@ constexpr float kAcesA = 0.6f * 0.6f * 2.51f, kAcesB = 0.6f * 0.03f, kAcesC = 0.
                 kAcesD = 0.6f * 0.59f, kAcesE = 0.14f;
 
 float aces(float x) {
-  x = std::clamp(x, 0.0f, 1e9f);  // the curve is at its end, 1, long before, and squares of more overflow
+  x = std::clamp(x, 0.0f, 1e9f);  // the curve has reached 1 long before; larger squares overflow
   return clamp01((kAcesA * x * x + kAcesB * x) / (kAcesC * x * x + kAcesD * x + kAcesE));
 }
 
@@ -232,7 +232,7 @@ float luminance(const Image& image, size_t p) {
   return 0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2];
 }
 
-/// Numbers that rise with the floats.
+/// Maps floats to integers of the same order.
 constexpr uint32_t kSign = 1u << 31;
 uint32_t rising(float value) {
   const auto bits = std::bit_cast<uint32_t>(value);
@@ -240,11 +240,11 @@ uint32_t rising(float value) {
 }
 float float_of(uint32_t rising) { return std::bit_cast<float>(rising & kSign ? rising & ~kSign : ~rising); }
 
-/// How often values were seen.
+/// Counts of values.
 class Histogram {
  public:
   void add(uint16_t value) { ++counts_[value]; }
-  /// The value that `rank` of them come before; `rank` becomes its own among those that are equal.
+  /// The value at position `rank` in sorted order; `rank` becomes its position among values in the same bin.
   uint32_t value_at(uint64_t& rank) const {
     uint32_t value = 0;
     while (rank >= counts_[value]) rank -= counts_[value++];
@@ -262,7 +262,7 @@ FlipExposures flip_exposures(const Image& reference) {
 }
 
 FlipExposures flip_exposures(const VisitImages& visit) {
-  // The median: first the upper half of its bits, then the lower one.
+  // Median by two histograms: of the upper half of the bits, then of the lower.
   Histogram upper, lower;
   uint64_t rank = 0;
   float brightest = -std::numeric_limits<float>::infinity();
@@ -281,11 +281,11 @@ FlipExposures flip_exposures(const VisitImages& visit) {
         lower.add(static_cast<uint16_t>(bits & 0xffff));
   });
   const float middle = float_of(high << 16 | lower.value_at(rank));
-  // A reference that is mostly or all black has no such exposures; the smallest positive value stands in.
+  // If the reference is all or mostly black, these are undefined; the smallest positive value stands in.
   constexpr float kSmallest = 1e-7f;
   const float median = std::clamp(middle, kSmallest, std::numeric_limits<float>::max());
   const float largest =
-      std::clamp(brightest, median, std::numeric_limits<float>::max());  // a sum of three may be infinite
+      std::clamp(brightest, median, std::numeric_limits<float>::max());  // a sum of three may overflow
   // The luminance that the tone curve maps to 0.85, [Andersson2021] Sec. 3: the positive root of k(x) = t.
   constexpr double kTarget = 0.85;
   const double a = kAcesA - kTarget * kAcesC, b = kAcesB - kTarget * kAcesD, c = -kTarget * kAcesE;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kWidth = 64, kHeight = 48;
 
-/// Waves of three frequencies, disturbed by `amplitude`; with `slope`, brightness rises by 1 % … 600 % along x.
+/// Waves of three frequencies, perturbed by `amplitude`; `slope` scales brightness from 1 % to 600 % along x.
 Image waves(double amplitude, double scale, double slope) {
   Image image(kWidth, kHeight, 3);
   for (int y = 0; y < kHeight; ++y)
@@ -34,7 +34,7 @@ double mean_of(const Image& map) {
   return sum / static_cast<double>(map.data.size());
 }
 
-// The peer computes in float, with powers and exponentials of its own: agreement to 2e-5 of values below 0.3.
+// flip-evaluator computes in float with other powers and exponentials: agreement to 2e-5 of values below 0.3.
 constexpr double kTolerance = 2e-5;
 
 TEST(Flip, LowDynamicRangeAgreesWithItsAuthors) {
@@ -43,7 +43,7 @@ TEST(Flip, LowDynamicRangeAgreesWithItsAuthors) {
   EXPECT_NEAR(*map.pixel(0, 0), 0.24755655229091644, kTolerance);
   EXPECT_NEAR(*map.pixel(20, 30), 0.042607445269823074, kTolerance);
   EXPECT_NEAR(*map.pixel(63, 47), 0.17202946543693542, kTolerance);
-  // A viewing distance that is 1 % off is already rejected.
+  // A viewing distance that is off by 1 % is rejected.
   EXPECT_GT(std::abs(mean_of(flip_ldr(waves(0.4, 1, 0), waves(0, 1, 0), 1.01f * kFlipPixelsPerDegree)) - 0.11694005),
             10 * kTolerance);
 }
@@ -66,7 +66,7 @@ TEST(Flip, OfAnImageWithItselfIsZero) {
     for (float v : map.data) ASSERT_EQ(v, 0);
 }
 
-// The largest difference of two colours of sRGB in the metric's own sense, green and blue, has error one.
+// Green and blue are the sRGB colours that differ most in this metric; their error is one.
 TEST(Flip, LargestDifferenceIsOne) {
   Image green(40, 40, 3), blue(40, 40, 3);
   for (size_t p = 0; p < 1600; ++p) green.data[p * 3 + 1] = blue.data[p * 3 + 2] = 1;
@@ -79,7 +79,7 @@ TEST(Flip, BlackReferenceIsFinite) {
   for (float v : flip_hdr(waves(0, 1, 0), Image(kWidth, kHeight, 3)).data) ASSERT_TRUE(v >= 0 && v <= 1);
 }
 
-// The tone curve ends at 1 and must not overflow before.
+// The tone curve saturates at 1 and must not overflow before.
 TEST(Flip, HugeValuesAreWhite) {
   Image white(8, 8, 3), huge(8, 8, 3);
   const Image black(8, 8, 3);

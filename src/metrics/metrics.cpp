@@ -17,7 +17,7 @@
 namespace covary {
 namespace {
 
-/// One pixel of a render and of its references, in double.
+/// A pixel of the image and its references, in double.
 struct Pixel {
   std::array<double, 3> f, r1, r2, r;  // r: mean of the references
   double grey = 0;                     // mean of r over the channels
@@ -30,7 +30,7 @@ struct Pixel {
       grey += r[c] / 3;
     }
   }
-  /// Mean over the channels of (F - R1)(F - R2); the squared difference when there is one reference.
+  /// Mean over channels of (F - R1)(F - R2); of the squared difference if there is one reference.
   double squared_error() const {
     double sum = 0;
     for (size_t c = 0; c < 3; ++c) sum += (f[c] - r1[c]) * (f[c] - r2[c]);
@@ -63,7 +63,7 @@ double pixel_error(Metric metric, const Pixel& p) {
   throw Error(ErrorCode::kInternal, "not a sum over single pixels");
 }
 
-/// A value of an error map: of errors that are too large for a float, the largest.
+/// Error for the map, clamped to the largest float.
 float map_value(double error) {
   constexpr double kLargest = std::numeric_limits<float>::max();
   return static_cast<float>(std::clamp(error, -kLargest, kLargest));
@@ -75,7 +75,7 @@ bool is_finite(const ComparedRows::Band& band, size_t p) {
          pixel_is_finite(*band.references.back(), p);
 }
 
-/// Relative squared errors of the values of a pixel, each by its own reference; 0 where the pixel is left out.
+/// Relative squared error of each channel, by its own reference value; 0 for pixels left out.
 std::array<double, 3> channel_errors(const ComparedRows::Band& band, size_t p) {
   std::array<double, 3> errors{};
   if (!is_finite(band, p)) return errors;
@@ -85,19 +85,19 @@ std::array<double, 3> channel_errors(const ComparedRows::Band& band, size_t p) {
   return errors;
 }
 
-/// Calls f(band, first row) for all rows, in order.
+/// Calls f(band, first row) for all bands, in order.
 template <typename F>
 void for_each_band(ComparedRows& rows, const F& f) {
   for (int y = 0; y < rows.height(); y += rows.band_rows())
     f(rows.rows(y, std::min(rows.band_rows(), rows.height() - y)), y);
 }
 
-/// An error of kRelMseTrimmed and which it is, 3 for each pixel.
+/// A relative error and its index (3 per pixel), which breaks ties.
 using RankedError = std::pair<double, uint64_t>;
 
-/// What kRelMseTrimmed leaves out, and by what the rest is to be multiplied for each pixel.
+/// What kRelMseTrimmed drops, and the factor that makes the mean over pixels the mean of the rest.
 struct TrimmedErrors {
-  std::optional<RankedError> smallest_dropped;  ///< of equal errors, those of later pixels are left out first
+  std::optional<RankedError> smallest_dropped;  ///< of equal errors, later pixels are dropped first
   double scale = 1;
 };
 
@@ -128,22 +128,22 @@ TrimmedErrors trimmed_errors(ComparedRows& rows) {
   return result;
 }
 
-/// FLIP looks at neighbourhoods: pixels that are left out become equal in both images. The reference is the mean of
-/// all references.
+/// FLIP uses neighbourhoods, so excluded pixels are made equal in both images. The reference is the mean of the
+/// references.
 std::pair<Image, Image> flip_inputs(const ComparedRows::Band& band) {
   std::pair<Image, Image> images(*band.image, *band.references.front());
   auto& [f, r] = images;
   for (size_t p = 0; p < f.data.size() / 3; ++p) {
     const bool finite = is_finite(band, p);
     for (size_t i = p * 3; i < p * 3 + 3; ++i) {
-      r.data[i] = 0.5f * r.data[i] + 0.5f * band.references.back()->data[i];  // their sum may be infinite
+      r.data[i] = 0.5f * r.data[i] + 0.5f * band.references.back()->data[i];  // their sum may overflow
       if (!finite) f.data[i] = r.data[i] = 0;
     }
   }
   return images;
 }
 
-/// What the errors of single pixels of one metric need to know of the whole image.
+/// Per-pixel errors of one metric, including what they need to know of the whole image.
 class ErrorOfPixels {
  public:
   ErrorOfPixels(Metric metric, ComparedRows& rows, bool low_dynamic_range) : metric_(metric), rows_(rows) {
@@ -154,7 +154,7 @@ class ErrorOfPixels {
     if (metric == Metric::kRelMseTrimmed) trimmed_ = trimmed_errors(rows);
   }
 
-  /// Reads a band. FLIP looks at rows around it.
+  /// Reads a band; for FLIP, also the rows around it.
   const ComparedRows::Band& move_to(int first_row, int n_rows) {
     const int reach = metric_ == Metric::kFlip ? kFlipReach : 0;
     const int first = std::max(first_row - reach, 0), end = std::min(first_row + n_rows + reach, rows_.height());
@@ -167,10 +167,10 @@ class ErrorOfPixels {
     }
     return band_;
   }
-  /// Where pixel p of the rows asked for is in the band.
+  /// Index in the band of pixel p of the requested rows.
   size_t in_band(size_t p) const { return offset_ + p; }
 
-  /// Of a pixel of the band that is finite.
+  /// For a finite pixel of the band.
   double error(size_t p) const {
     if (metric_ == Metric::kFlip) return flip_.data[p];
     if (metric_ != Metric::kRelMseTrimmed) return pixel_error(metric_, Pixel(band_, p));

@@ -25,7 +25,7 @@ double value(Metric metric, const Image& image, std::vector<Image> references) {
   return compute_metric(metric, image, references).value;
 }
 
-/// 1 + x/64 plus noise of standard deviation `sigma`, uniform; `seed` makes it.
+/// 1 + x/64 plus uniform noise of standard deviation `sigma`.
 Image noisy(int size, double offset, double sigma, uint64_t seed) {
   Image image(size, size, 3);
   for (size_t i = 0; i < image.data.size(); ++i) {
@@ -37,7 +37,7 @@ Image noisy(int size, double offset, double sigma, uint64_t seed) {
 }
 
 TEST(Metrics, WorkedOutByHand) {
-  // Differences (1, 0, -1) at a pixel of mean 2, and (0.3, 0, 0) at a black one.
+  // Differences (1, 0, -1) at a pixel with mean 2, and (0.3, 0, 0) at a black one.
   const Image f = image_of({2, 2, 2, 0.3f, 0, 0}), r = image_of({1, 2, 3, 0, 0, 0});
   EXPECT_NEAR(value(Metric::kRelMse, f, {r}), (2 / 4.01 + 0.09 / 0.01) / 6, 1e-6);
   EXPECT_NEAR(value(Metric::kMse, f, {r}), 2.09 / 6, 1e-7);
@@ -50,7 +50,7 @@ TEST(Metrics, WorkedOutByHand) {
 }
 
 TEST(Metrics, CountsPixelsAboveFivePercent) {
-  // Sums of differences: 0.04 of 1, 0.06 of 1, none of black, something of black, 0.25 of 5 in different channels.
+  // Relative differences of sums: 0.04 and 0.06 of 1; 0 / 0; positive / 0; 0.25 of 5, split over channels.
   const Image r = image_of({0.5f, 0.5f, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 1});
   const Image f = image_of({0.52f, 0.48f, 0, 1, 0.06f, 0, 0, 0, 0, 0, 1e-6f, 0, 2.2f, 1.9f, 1});
   const MetricResult result = compute_metric(Metric::kAbove5, f, std::vector{r});
@@ -61,7 +61,7 @@ TEST(Metrics, CountsPixelsAboveFivePercent) {
   EXPECT_EQ(value(Metric::kAbove5, above, {low, high}), 0) << "0.1 of 3.1";
 }
 
-// 1,000 pixels: 3 of the 3,000 values are dropped, whichever pixels they belong to.
+// 1,000 pixels: 3 of the 3,000 values are dropped, regardless of their pixels.
 TEST(Metrics, TrimmedRelMseLeavesOutTheLargestValues) {
   std::vector<float> values(3000, 1.0f), reference(3000, 1.0f);
   for (size_t i = 0; i < values.size(); i += 10) values[i] = 1.1f;
@@ -73,7 +73,7 @@ TEST(Metrics, TrimmedRelMseLeavesOutTheLargestValues) {
   const MetricResult result = compute_metric(Metric::kRelMseTrimmed, image_of(values), std::vector{r});
   EXPECT_EQ(result.map.data[1], 0) << "the pixel with 100";
   EXPECT_GT(result.map.data[740], 0) << "the pixel with 3";
-  // By the value's own reference, not by the pixel's mean.
+  // Relative to each value's own reference, not to the pixel's mean.
   EXPECT_NEAR(value(Metric::kRelMseTrimmed, image_of({2, 2, 2}), {image_of({1, 2, 4})}), (1 / 1.01 + 4 / 16.01) / 3,
               1e-7);
   EXPECT_NEAR(value(Metric::kRelMseTrimmed, image_of({2, 2, 2}), {image_of({1, 2, 4}), image_of({1.5f, 3, 3})}),
@@ -89,14 +89,14 @@ TEST(Metrics, TwoReferencesWorkedOutByHand) {
   EXPECT_EQ(value(Metric::kRelMse, f, {r1, r1}), value(Metric::kRelMse, f, {r1}));
 }
 
-// F differs from the truth by 0.1 everywhere; the references have noise of 0.2. The products' mean over N = 3 * 64^2
+// F differs from the truth by 0.1 everywhere; the references have noise of 0.2. The mean product over N = 3 * 64^2
 // values has standard deviation s = sqrt(2 * 0.1^2 * 0.2^2 + 0.2^4) / sqrt(N) = 4.4e-4. alpha = 1e-5: |z| < 4.42; an
-// error of (4.42 + 2.33) s = 3.0e-3 is found with power 0.99. The squares' bias, 0.2^2 = 0.04, is 91 s.
+// error of (4.42 + 2.33) s = 3.0e-3 is detected with power 0.99. The bias of the squares, 0.2^2 = 0.04, is 91 s.
 TEST(Metrics, ProductFormIsFreeOfTheReferencesNoise) {
   const Image f = noisy(64, 0.1, 0, 1), r1 = noisy(64, 0, 0.2, 2), r2 = noisy(64, 0, 0.2, 3);
   const double s = std::sqrt(2 * 0.01 * 0.04 + 0.0016) / std::sqrt(3.0 * 64 * 64);
   EXPECT_LT(std::abs(value(Metric::kMse, f, {r1, r2}) - 0.01), 4.42 * s);
-  // Planted: the same noise in both references, and one reference.
+  // Planted bugs: the same noise in both references, and only one reference.
   EXPECT_GT(std::abs(value(Metric::kMse, f, {r1, r1}) - 0.01), 4.42 * s);
   EXPECT_GT(std::abs(value(Metric::kMse, f, {r1}) - 0.01), 4.42 * s);
 }
@@ -119,7 +119,7 @@ TEST(Metrics, NonFinitePixelsAreLeftOutAndCounted) {
                        "none of the 1 pixels is finite"));
 }
 
-// Squares of these are beyond floats, not beyond doubles.
+// Their squares overflow floats but not doubles.
 TEST(Metrics, LargestFloats) {
   const float largest = std::numeric_limits<float>::max();
   const double square = static_cast<double>(largest) * largest;

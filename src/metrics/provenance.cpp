@@ -22,7 +22,7 @@ std::string attribute(const ImageFacts& image, const std::string& key, const std
   return it == image.info.attributes.end() ? otherwise : it->second;
 }
 
-/// Integrator and its parameters, pixel filter and sampler of the attribute `settings`: "path …; filter …; …".
+/// The attribute `settings`, "path …; filter …; …": integrator with parameters, pixel filter, sampler.
 struct Settings {
   std::string integrator, filter, sampler = "independent";
   explicit Settings(const std::string& text) {
@@ -37,7 +37,7 @@ struct Settings {
         integrator = part;
     }
   }
-  /// Light paths are independent whatever the sampler.
+  /// Light paths are independent of the sampler.
   bool traces_light() const { return has_light_film(integrator); }
 };
 
@@ -48,7 +48,7 @@ std::set<std::string> seeds_of(const ImageFacts& image) {
   return seeds;
 }
 
-/// Samples per pixel; 0 where the file does not tell.
+/// Samples per pixel; 0 if the file does not say.
 double samples_of(const ImageFacts& image) { return std::strtod(attribute(image, "samples", "0").c_str(), nullptr); }
 
 bool is_integer(const ImageFacts& image) {
@@ -115,7 +115,8 @@ std::vector<std::string> comparison_warnings(const ImageFacts& image, const Imag
   const std::set<std::string> seeds = seeds_of(image), other_seeds = seeds_of(reference);
   std::vector<std::string> common;
   std::set_intersection(seeds.begin(), seeds.end(), other_seeds.begin(), other_seeds.end(), std::back_inserter(common));
-  // Passes of common and of independent random numbers share no samples, whatever their seeds, nor do samplers.
+  // Passes of common and of independent random numbers share no samples, whatever their seeds; nor do different
+  // samplers.
   const Settings settings(attribute(image, "settings")), other(attribute(reference, "settings"));
   const bool same_sampler = settings.sampler == other.sampler || settings.traces_light();
   const std::string sampling = attribute(image, "sampling"), other_sampling = attribute(reference, "sampling");
@@ -127,7 +128,7 @@ std::vector<std::string> comparison_warnings(const ImageFacts& image, const Imag
     warn("show different scenes, or versions of one (attribute covary:scene_hash)");
   compare("were rendered with different settings", settings.integrator, other.integrator);
   compare("were rendered with different pixel filters", settings.filter, other.filter);
-  // An exposure of 0 is not written.
+  // An exposure of 0 is not stored.
   compare("have different exposures in stops", attribute(image, "exposure", "0"),
           attribute(reference, "exposure", "0"));
   if (is_integer(image) != is_integer(reference)) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files that do not belong together are noticed by what they say of themselves.
+// Files that do not belong together are detected by their attributes.
 #include "metrics/provenance.h"
 
 #include <fmt/format.h>
@@ -24,7 +24,7 @@ ImageFacts facts(const std::string& path, const std::map<std::string, std::strin
   return result;
 }
 
-/// All warnings of an image that differs from the reference (of seed 9) by these attributes.
+/// All warnings for an image that differs from the reference (seed 9) in these attributes.
 std::string warnings(const std::map<std::string, std::string>& changes) {
   return fmt::format("{}",
                      fmt::join(comparison_warnings(facts("a.exr", changes), facts("r.exr", {{"seed", "9"}})), "|"));
@@ -67,7 +67,7 @@ TEST(Provenance, Precision) {
     EXPECT_TRUE(contains(found[0], "differ in precision: a.png holds uint8 values, rounded and cut off at white"));
   }
   EXPECT_TRUE(comparison_warnings(rounded, rounded).empty());
-  // The numbers of samples in a film are integers, its colours are not.
+  // Sample counts in a film are integers, but its colours are not.
   ImageFacts film = facts("a.exr");
   film.info.channels.push_back({"samples", "uint"});
   EXPECT_TRUE(comparison_warnings(film, facts("r.exr", {{"seed", "9"}})).empty());

@@ -17,13 +17,13 @@ namespace covary {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kResolved = 4;        // standard errors of the references that a region's error is above 0
-constexpr int kStillSide = 8;          // blocks that are unchanged or not
-constexpr double kStillChange = 1e-3;  // relative squared change of a block that is unchanged
+constexpr double kResolved = 4;        // a region's error is resolved if it exceeds 0 by this many standard errors
+constexpr int kStillSide = 8;          // side of the blocks that are classified as unchanged or not
+constexpr double kStillChange = 1e-3;  // largest relative squared change of an unchanged block
 
 double square(double x) { return x * x; }
 
-/// What a pixel adds to the errors of its region: a product, and its variance by the references' noise.
+/// Contribution of a pixel to the errors of its region: a product, and its variance due to noise in the references.
 struct PixelError {
   double error = 0, noise = 0;
 };
@@ -35,9 +35,9 @@ double weight(const std::vector<Image>& references, size_t p) {
   return 1 / (grey * grey + kRelativeOffset);
 }
 
-/// With a = F - R1 and b = F - R2 by channel, F - R = (a + b) / 2 and R1 - R2 = b - a:
-/// ab = (F - R)^2 - (R1 - R2)^2 / 4, whose noise is that of (F - R)(R1 - R2), of variance its square, and of the last
-/// term.
+/// Per channel, with a = F - R1 and b = F - R2, F - R = (a + b) / 2 and R1 - R2 = b - a, so that
+/// ab = (F - R)^2 - (R1 - R2)^2 / 4. Its noise comes from the cross term (F - R)(R1 - R2), whose square estimates its
+/// variance, and from the last term.
 template <typename Difference>
 PixelError pixel_error(double w, const Difference& difference) {
   PixelError result;
@@ -52,7 +52,7 @@ PixelError pixel_error(double w, const Difference& difference) {
   return result;
 }
 
-/// Corners of regions along a side.
+/// First pixels of the regions along one side.
 std::vector<int> region_starts(int size) {
   std::vector<int> starts;
   for (int start = 0; start + kRegionSide <= size; start += kRegionSide) starts.push_back(start);
@@ -75,7 +75,7 @@ RegionErrors regions_of(const std::vector<PixelError>& errors, int width, int he
           error += pixel.error, noise += pixel.noise;
         }
       regions.error.push_back(error / n);
-      regions.noise.push_back(noise / (n * n));  // the references' pixels are independent
+      regions.noise.push_back(noise / (n * n));  // noise is independent between pixels of the references
     }
   return regions;
 }
@@ -86,7 +86,7 @@ double mean(const std::vector<PixelError>& errors, uint64_t n_left_out) {
   return sum / static_cast<double>(errors.size() - n_left_out);
 }
 
-/// Whether the pixel is finite in the frame and its references.
+/// Whether the pixel is finite in the frame and in its references.
 bool is_finite(const Image& frame, const std::vector<Image>& references, size_t p) {
   return pixel_is_finite(frame, p) && pixel_is_finite(references.front(), p) && pixel_is_finite(references.back(), p);
 }
@@ -98,7 +98,7 @@ Image mean_of(const std::vector<Image>& references) {
   return result;
 }
 
-/// Mean over frames of what is finite.
+/// Weighted mean over frames of the finite values.
 double mean_of_frames(std::span<const FrameErrors> frames, const std::function<double(const FrameErrors&)>& value,
                       const std::function<double(const FrameErrors&)>& weight_of = {}) {
   double sum = 0, n = 0;
@@ -123,7 +123,7 @@ void take_worst(const RegionErrors& tested, const RegionErrors& other, int frame
   }
 }
 
-/// Means over frames. References of all frames may have one seed: their noise is not taken for less in the mean.
+/// Means over frames. The references of all frames may share a seed, so averaging is not taken to reduce their noise.
 RegionErrors mean_of(std::span<const RegionErrors* const> frames) {
   RegionErrors result;
   double n = 0;
@@ -200,7 +200,7 @@ void SequenceErrors::add_changes(const Image& frame, const std::vector<Image>& r
   }
   errors.temporal = mean(of_pixels, left_out);
   errors.temporal_regions = regions_of(of_pixels, frame.width, frame.height);
-  // One set of exposures, so that both are on one scale.
+  // The same exposures for both, so that they are comparable.
   const FlipExposures exposures = low_dynamic_range ? FlipExposures() : flip_exposures(r);
   const auto flip = [&](const Image& image, const Image& before) {
     return low_dynamic_range ? flip_ldr(image, before) : flip_hdr(image, before, exposures);

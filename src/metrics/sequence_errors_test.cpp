@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Errors of sequences: values that are known, on images around 1 with noise of fixed seeds, and planted trails.
+// Errors of sequences: known values on images around 1 with noise of fixed seeds, and planted ghosting.
 #include "metrics/sequence_errors.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kWidth = 96, kHeight = 64, kFrames = 4;
 
-/// 1 + `offset` + noise of standard deviation `sigma`, uniform; seeds make it.
+/// 1 + `offset` + uniform noise of standard deviation `sigma`.
 Image noisy(double offset, double sigma, uint64_t seed, int frame) {
   Image image(kWidth, kHeight, 3);
   for (size_t i = 0; i < image.data.size(); ++i) {
@@ -49,8 +49,8 @@ void add_to(Image& image, int x0, int y0, int x1, int y1, float value) {
 }
 
 TEST(SequenceErrors, LeaveOutTheReferencesNoise) {
-  // 73,728 products of standard deviation below 0.1 each, whose mean has one of 4e-4; weights are 1 / 1.01 but for the
-  // references' noise, which changes them by 1 % at most.
+  // 73,728 products of standard deviation below 0.1 each; that of their mean is 4e-4. Weights are 1 / 1.01 up to 1 %
+  // from noise in the references.
   const SequenceSummary s = summary_of(errors_of(0.2, 0.1, 0.1));
   EXPECT_NEAR(s.relmse, (0.04 + 0.01) / 1.01, 0.002);
   EXPECT_NEAR(s.temporal, 2 * 0.01 / 1.01, 0.002) << "what stays is no change";
@@ -69,7 +69,7 @@ TEST(SequenceErrors, TemporalFlipSeesFlickerAndNoBiasThatStays) {
   const double flicker = summary_of(errors_of(0, 0.1, 0.001)).temporal_flip;
   EXPECT_GT(flicker, 0.02);
   EXPECT_LT(summary_of(errors_of(0.2, 0.001, 0.001)).temporal_flip, 0.1 * flicker);
-  // A change that the references have, too, is none.
+  // A change that the references share is no error.
   const Change flash = [](int f, Image& image) { add_to(image, 0, 0, kWidth, kHeight, f == 2 ? 1.0f : 0.0f); };
   EXPECT_LT(summary_of(errors_of(0, 0.001, 0.001, flash, 3, flash)).temporal_flip, 0.1 * flicker);
   EXPECT_GT(summary_of(errors_of(0, 0.001, 0.001, flash)).temporal_flip, flicker) << "only the frames have it";
