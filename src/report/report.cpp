@@ -25,7 +25,7 @@ void append(std::string& text, std::initializer_list<std::string_view> parts) {
   for (const std::string_view part : parts) text += part, text += '\n';
 }
 
-/// The text with replacement characters for what is not UTF-8, such as a file name.
+/// Replaces invalid UTF-8, e.g. in a file name, by replacement characters.
 std::string valid_utf8(const std::string& text) {
   return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
 }
@@ -51,8 +51,8 @@ std::string escaped_html(const std::string& text) {
   return result;
 }
 
-/// JSON that may stand inside a <script>: no '<', so nothing in it can end the element or begin a comment. Text that is
-/// not UTF-8, such as a file name, keeps its place with replacement characters.
+/// JSON safe inside a <script>: no '<', so nothing can close the element or open a comment. Invalid UTF-8, e.g. in a
+/// file name, becomes replacement characters.
 std::string script_json(const Json& json) {
   std::string result;
   for (const char c : json.dump(-1, ' ', false, Json::error_handler_t::replace)) {
@@ -64,7 +64,7 @@ std::string script_json(const Json& json) {
   return result;
 }
 
-/// Width, height and channels of each image by id.
+/// Width, height and channels of each image, by id.
 using Sizes = std::map<std::string, std::array<int, 3>>;
 
 void check_block(const Json& block, const Sizes& sizes) {
@@ -108,7 +108,8 @@ std::string styles() {
   return text;
 }
 
-/// All scripts in one function, so that their names stay off the page's global scope; later files use earlier ones.
+/// All scripts wrapped in one function to keep their names out of the page's global scope; later files use earlier
+/// ones.
 std::string scripts() {
   using namespace report_files;
   std::string text;
@@ -119,7 +120,7 @@ std::string scripts() {
   return text;
 }
 
-/// page.html with each {{name}} replaced.
+/// page.html with each {{name}} substituted.
 std::string fill_page(const Json& document, const std::vector<ReportImage>& images) {
   Json data = document;
   data["error_colours"] = error_colours();
@@ -154,7 +155,7 @@ std::string image_element(const ReportImage& image) {
                      escaped_html(image.id), encode_image(image.pixels));
 }
 
-/// The images stand behind everything else, so that a browser shows the page while it still reads them.
+/// Images come last, so that a browser shows the page while they are still loading.
 void write_images(OutputFile& file, const std::vector<ReportImage>& images) {
   const size_t at_once = std::max(1u, std::thread::hardware_concurrency());
   std::vector<std::string> elements(at_once);

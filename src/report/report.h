@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One self-contained HTML page of tables, plots and an image comparer. The page knows nothing of methods or scenes: it
-// draws a document, whose format docs/report.md describes, and the images that the document names.
+// One self-contained HTML page with tables, plots and an image comparer. The page knows nothing about methods or
+// scenes: it renders a document, whose format docs/report.md describes, and the images that the document names.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -11,16 +11,16 @@
 
 namespace covary {
 
-/// An image of the page: linear RGB, or numbers of 1 channel. The page holds it in half floats (11 significant bits,
-/// finite values within ±65504), compressed without further loss, and decodes it when it is first shown.
+/// An image of the page: linear RGB, or 1 channel of numbers. Stored as half floats (11 significant bits, finite values
+/// within ±65504), losslessly compressed, and decoded when first shown.
 struct ReportImage {
   std::string id;  ///< the document's name for it; unique
   Image pixels;
 };
 
-/// Writes the page to `path`; it appears under its name only when complete. Throws Error(kIo) when it cannot be written
-/// and Error(kInternal) when the document has a block of unknown type or names an image that is not among `images`,
-/// when two images share an id, or when an image has neither 1 nor 3 channels.
+/// Writes the page to `path`, atomically. Throws Error(kIo) if it cannot be written and Error(kInternal) if the
+/// document has a block of unknown type or names an image that is not among `images`, if two images share an id, or if
+/// an image has neither 1 nor 3 channels.
 void write_report(const std::string& path, const nlohmann::ordered_json& document,
                   const std::vector<ReportImage>& images);
 

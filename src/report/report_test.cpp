@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What stands in the written file; tests/report opens it in a browser.
+// The contents of the written file; tests/report opens it in a browser.
 #include "report/report.h"
 
 #include <gtest/gtest.h>
