@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What bidirectional methods need of every model, wrappers included: values for importance are the adjoint of those for
-// radiance, densities of the other end are right without binding again, and shading normals keep light and camera paths
-// equal. All comparisons are of single pairs of directions: no statistics.
+// What bidirectional methods require of every model, wrappers included: values for importance are the adjoint of those
+// for radiance, reverse densities need no second bind(), and with shading normals light and camera paths agree. All
+// comparisons are of single pairs of directions: no statistics.
 #include <cmath>
 #include <functional>
 #include <map>
@@ -16,7 +16,7 @@ namespace {
 struct Case {
   const char* name;
   Json model;
-  Vec2 gradient{};           // of the displacement, for bump maps
+  Vec2 gradient{};           // of the bump map's displacement
   bool camera_only = false;  // some delta pairs are found from the camera only
 };
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
@@ -136,7 +136,7 @@ TEST_P(Adjoint, ValuesForImportanceAreThoseForRadianceExchanged) {
   }
 }
 
-// What a path passes by chance, drawn with 4000 numbers at equal distances, and what light passes with certainty.
+// Null transmission as sampled, with 4000 equally spaced u_lobe, against null_passage().
 TEST_P(Adjoint, NullPassageIsWhatSamplesPass) {
   constexpr int kNumbers = 4000;
   for (int i = 0; i < 20; ++i) {
@@ -156,7 +156,7 @@ TEST_P(Adjoint, NullPassageIsWhatSamplesPass) {
   }
 }
 
-// The density of the other end, from this closure and from the model bound at the other end.
+// Reverse density, from this closure and from the model bound at the other end.
 TEST_P(Adjoint, ReverseDensitiesAreThoseOfTheOtherEnd) {
   int n_both = 0;
   for (int i = 0; i < 2000; ++i) {
@@ -176,8 +176,7 @@ TEST_P(Adjoint, ReverseDensitiesAreThoseOfTheOtherEnd) {
   }
 }
 
-/// Draws from all delta lobes by scanning the number that chooses the lobe, and returns by lobe its probability and the
-/// sample.
+/// Scans u_lobe over all delta lobes; returns the probability and the sample of each lobe.
 std::map<uint32_t, std::pair<float, BsdfSample>> delta_lobes(const BsdfClosure& closure, const Vec3& wo) {
   constexpr int kSteps = 1000;
   std::map<uint32_t, std::pair<float, BsdfSample>> lobes;
@@ -209,14 +208,14 @@ TEST_P(Adjoint, DeltaLobesAreFoundFromBothEndsOrFromTheCameraOnly) {
         const bool finds = match != back.end() && length(match->second.second.wi - wo) < 2e-3f;
         EXPECT_NEAR(here.reverse_pmf(wo, s), finds ? match->second.first : 0, 3e-3f) << "direction " << i;
         if (!finds) {
-          // What the light draws and the camera does not must carry nothing.
+          // What only the light path samples must carry nothing.
           if (!radiance) {
             EXPECT_EQ(scale(s.weight), 0) << "direction " << i;
           }
           n_camera_only += radiance;
           float pmfs[kMaxLobes];
           here.lobe_pmfs(s.wi, pmfs);
-          n_planted += radiance && pmfs[lobe] > 0;  // the lobe's probability alone would claim to find the pair
+          n_planted += radiance && pmfs[lobe] > 0;  // lobe_pmfs() alone would claim that the pair is found
           continue;
         }
         ++n_both;

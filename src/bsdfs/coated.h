@@ -8,7 +8,7 @@
 
 namespace covary {
 
-/// Such a model, with its colours.
+/// Parameters common to these models.
 class CoatedBsdf : public Bsdf {
  public:
   const Texture* main_texture() const final { return diffuse_.texture(); }
@@ -20,7 +20,7 @@ class CoatedBsdf : public Bsdf {
     const float sum = diffuse_.mean() + specular_.mean();
     specular_weight_ = sum > 0 ? specular_.mean() / sum : 0.5f;
   }
-  /// The index of a rough coating must differ from 1.
+  /// The relative index of a rough coating must not be 1.
   static void check_index(float eta, Parameters& p) {
     if (eta == 1) p.error("'int_ior' and 'ext_ior' are equal; they must differ");
   }
@@ -28,8 +28,8 @@ class CoatedBsdf : public Bsdf {
   float specular_weight_;
 };
 
-/// Closure of a model with a rough coating. `Model` derives from it and has eval() and specular_pmf(cosine of wo), the
-/// probability of the coating's lobe.
+/// CRTP base of the closure of a model with a rough coating. `Model` provides eval() and specular_pmf(cosine of wo),
+/// the probability of the coating's lobe.
 template <typename Model>
 class CoatedClosure : public BsdfClosure {
  public:
@@ -37,7 +37,7 @@ class CoatedClosure : public BsdfClosure {
 
   uint32_t flags() const final { return kGlossyReflection | kDiffuseReflection; }
   BsdfSample sample(const Vec3& wo, float u_lobe, Vec2 u) const final {
-    BsdfSample s;  // the one object returned, so that it is built where the caller wants it
+    BsdfSample s;  // single return object: copy elision (NRVO)
     if (!(wo.z > 0)) return s;
     if (u_lobe < model().specular_pmf(wo.z)) {
       s.wi = reflect(wo, surface_.sample(wo, u).m);

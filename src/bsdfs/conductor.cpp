@@ -43,7 +43,7 @@ class Conductor final : public Bsdf {
   const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode, Arena& arena) const override {
     return arena.make<ConductorClosure>(index_.eta.eval(hit), index_.k.eval(hit), scale_.eval(hit));
   }
-  /// Reflectance at normal incidence, the colour of the metal.
+  /// Reflectance at normal incidence.
   Spectrum albedo(const SurfaceHit& hit) const override {
     return clamp01(scale_.eval(hit) * fresnel_conductor(1, index_.eta.eval(hit), index_.k.eval(hit)));
   }

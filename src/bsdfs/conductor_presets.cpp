@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Complex indices of refraction of conductors (and some dielectrics), the names that Mitsuba scenes use. Spectra:
-// Palik, "Handbook of Optical Constants of Solids", 1998, and the Luxpop collection; converted to linear Rec. 709 RGB
-// with the CIE 1931 observer so that a constant spectrum c becomes (c, c, c), negative channels set to 0.
+// Complex indices of refraction of conductors (and some dielectrics) under Mitsuba's names. Spectra: Palik, "Handbook
+// of Optical Constants of Solids", 1998, and the Luxpop collection; converted to linear Rec. 709 RGB with the CIE 1931
+// observer such that a constant spectrum c becomes (c, c, c), negative channels set to 0.
 #include "bsdfs/conductor_presets.h"
 
 #include <algorithm>

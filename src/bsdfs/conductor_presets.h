@@ -15,7 +15,7 @@ struct ConductorPreset {
   Spectrum eta, k;
 };
 
-/// Null when there is no such name. Names are case sensitive, as chemical formulas are.
+/// Null if there is no such name. Names are case sensitive, like chemical formulas.
 const ConductorPreset* find_conductor_preset(std::string_view name);
 /// All names, sorted.
 std::vector<std::string> conductor_preset_names();

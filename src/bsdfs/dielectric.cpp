@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // dielectric: a perfectly smooth interface between two transparent media, e.g. glass and air; mirror reflection and
 // refraction from both sides. The interior is the side the normal points away from.
-// thindielectric: a pane of glass as one sheet: mirror reflection, and transmission straight through, from both sides.
+// thindielectric: a thin pane of glass: mirror reflection and straight transmission, from both sides.
 //
 // | name                   | type           | default | meaning                                           |
 // |------------------------|----------------|---------|---------------------------------------------------|
 // | int_ior                | number/string  | bk7     | index of refraction inside, or a material's name  |
 // | ext_ior                | number/string  | air     | the same outside                                  |
 // | specular_reflectance   | colour/texture | 1       | factor on the reflection; not physical unless 1   |
-// | specular_transmittance | colour/texture | 1       | factor on what passes; not physical unless 1      |
+// | specular_transmittance | colour/texture | 1       | factor on transmission; not physical unless 1     |
 //
-// Reflection is chosen with the reflectance as probability: that of Fresnel, R; a pane of two interfaces reflects
+// Reflection is sampled with the reflectance as its probability: the Fresnel reflectance R of an interface; for a pane
 //     R + T R T + T R^3 T + ... = 2 R / (1 + R),   T = 1 - R.
-// Refracted radiance is scaled by the squared ratio of indices (Veach 1997, Section 5.2), importance not.
+// Refracted radiance is scaled by the squared ratio of indices (Veach 1997, Section 5.2); importance is not.
 #include "bsdfs/fresnel.h"
 #include "bsdfs/inputs.h"
 #include "bsdfs/registry.h"
@@ -20,7 +20,7 @@
 namespace covary {
 namespace {
 
-/// A mirror for a part of the light; the rest passes.
+/// Mirror reflection with some probability, otherwise transmission.
 class SmoothClosure : public BsdfClosure {
  public:
   SmoothClosure(float eta, TransportMode mode, const Spectrum& reflectance, const Spectrum& transmittance)

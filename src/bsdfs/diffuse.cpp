@@ -5,7 +5,7 @@
 // |-------------|----------------|---------|------------------------------------------|
 // | reflectance | colour/texture | 0.5     | fraction of light reflected, per channel |
 //
-// f = reflectance / pi. Sampled by the cosine, so that the sample weight is the reflectance itself.
+// f = reflectance / pi. Cosine-weighted sampling: the sample weight is the reflectance itself.
 #include "bsdfs/inputs.h"
 #include "bsdfs/registry.h"
 #include "core/warp.h"
@@ -25,7 +25,7 @@ class DiffuseClosure final : public BsdfClosure {
     return {reflectance_ * pdf, pdf};
   }
   BsdfSample sample(const Vec3& wo, float, Vec2 u) const override {
-    BsdfSample s;  // the one object returned, so that it is built where the caller wants it
+    BsdfSample s;  // single return object: copy elision (NRVO)
     if (!(wo.z > 0)) return s;
     s.wi = warp::square_to_cosine_hemisphere(u);
     s.pdf = warp::cosine_hemisphere_pdf_solid_angle(s.wi.z);

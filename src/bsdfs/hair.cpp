@@ -5,20 +5,20 @@
 // |------------------------|----------------|---------|---------------------------------------------------------------|
 // | eumelanin              | float          | 1.3     | concentration of the brown and black pigment                  |
 // | pheomelanin            | float          | 0.2     | concentration of the red pigment                              |
-// | sigma_a                | colour/texture |         | absorption per radius of the fibre, instead of the pigments   |
+// | sigma_a                | colour/texture |         | absorption per fibre radius, instead of the pigments          |
 // | scale                  | float          | 1       | factor on sigma_a                                             |
 // | int_ior                | number/string  | amber   | index of refraction of the fibre                              |
 // | ext_ior                | number/string  | air     | index of refraction outside; must differ from int_ior         |
 // | longitudinal_roughness | float          | 0.3     | beta_m, along the fibre                                       |
-// | azimuthal_roughness    | float          | 0.3     | beta_n, around it                                             |
+// | azimuthal_roughness    | float          | 0.3     | beta_n, around the fibre                                      |
 // | scale_tilt             | float          | 2       | alpha, angle of the scales on the fibre's surface, in degrees |
 //
-// The fibre runs along y of the shading frame. theta is the angle from the plane across it, phi the angle around it, h
-// the offset of the camera's ray from the axis. Light that passes p segments inside the fibre leaves with
+// The fibre runs along y of the shading frame. theta is the inclination from the normal plane, phi the azimuth, h the
+// offset of the camera's ray from the axis. Light that travels p segments inside the fibre leaves with
 //     S_p(theta_o, theta_i, phi, h) = M_p(theta_o, theta_i) A_p(theta_o, h) N_p(phi, h),      value = sum_p S_p,
-// p = 0 (R), 1 (TT), 2 (TRT) and the rest together, which is even around the fibre. Each is a lobe whose density is
-// M_p N_p and whose probability is the luminance of A_p. Attenuation, offset and tilt are those of the camera's side,
-// so the model is not reciprocal: light paths get its adjoint. Roughness below 0.02 is raised to it.
+// p = 0 (R), 1 (TT), 2 (TRT), and all longer paths together, with uniform azimuth. Each is a lobe with density M_p N_p,
+// chosen in proportion to the luminance of A_p. Attenuation, offset and tilt are evaluated on the camera's side, so the
+// model is not reciprocal: light paths get its adjoint. Roughness is clamped to at least 0.02.
 #include <array>
 #include <numbers>
 
@@ -30,7 +30,7 @@
 namespace covary {
 namespace {
 
-constexpr int kLast = 3;  // the lobe of all longer paths inside
+constexpr int kLast = 3;  // the lobe of all longer internal paths
 using Lobes = std::array<float, kLast + 1>;
 
 struct FibreShape {
@@ -48,7 +48,7 @@ FibreShape make_fibre(float eta, float beta_m, float beta_n, float alpha_degrees
   f.eta = eta;
   constexpr float kLeast = 0.02f;
   const double m = std::max(beta_m, kLeast), n = std::max(beta_n, kLeast);
-  // [Chiang2016]: variance and scale of the distributions, so that roughness looks even.
+  // [Chiang2016]: variance and scale as functions of perceptually uniform roughness.
   f.v[0] = static_cast<float>(sqr(0.726 * m + 0.812 * m * m + 3.7 * std::pow(m, 20)));
   f.v[1] = 0.25f * f.v[0];
   f.v[2] = f.v[3] = 4 * f.v[0];
@@ -64,7 +64,7 @@ FibreShape make_fibre(float eta, float beta_m, float beta_n, float alpha_degrees
   return f;
 }
 
-/// Each channel of `a` through `f`.
+/// Applies `f` to each channel of `a`.
 template <typename F>
 Spectrum each(const Spectrum& a, F f) {
   return {f(a.r), f(a.g), f(a.b)};
@@ -81,14 +81,14 @@ float log_bessel_i0(float x) {
   return std::log(sum);
 }
 
-/// M_p per unit of sin(theta) around the whole fibre: [EonFrancois2011].
+/// M_p per unit sin(theta), for all azimuths together: [EonFrancois2011].
 float longitudinal(SinCos in, SinCos out, float v) {
   const float a = in.cos * out.cos / v, b = in.sin * out.sin / v, rcp = 1 / v;
   // 1 / (2 v sinh(1/v)) = exp(-1/v) / (v (1 - exp(-2/v)))
   return std::exp(log_bessel_i0(a) - b - rcp) * rcp / -std::expm1(-2 * rcp);
 }
 
-/// What a path that arrives from the camera's side along w sees.
+/// The fibre as seen from the camera's direction w.
 class FibreView {
  public:
   FibreView(const FibreShape& fibre, const Spectrum& absorption, const Vec3& w) : fibre_(fibre) {
@@ -98,7 +98,7 @@ class FibreView {
     gamma_o_ = across > 0 ? std::acos(std::clamp(w.z / across, -1.0f, 1.0f)) : 0;
     if (!(w.x < 0)) gamma_o_ = -gamma_o_;
     const float h = std::sin(gamma_o_);
-    // Refraction of the fibre's cross section [Marschner2003]: eta' = sqrt(eta² - sin²) / cos.
+    // Refraction in the fibre's cross section [Marschner2003]: eta' = sqrt(eta² - sin²) / cos.
     const float sin_gamma_t = std::clamp(h * theta_.cos / safe_sqrt(sqr(fibre.eta) - sqr(theta_.sin)), -1.0f, 1.0f);
     gamma_t_ = std::asin(sin_gamma_t);
     const float cos_theta_t = safe_sqrt(1 - sqr(theta_.sin / fibre.eta));
@@ -131,9 +131,9 @@ class FibreView {
     return sum;
   }
 
-  /// A direction of lobe p: the angle around the fibre by `u_phi`, the one along it by `u`.
+  /// Samples a direction of lobe p: azimuth from `u_phi`, inclination from `u`.
   Vec3 sample(int p, float u_phi, Vec2 u) const {
-    // [EonMarschner2013]: the cosine of the angle from the mirrored direction, and where on that cone.
+    // [EonMarschner2013]: samples the cosine to the mirrored direction, then the position on that cone.
     const float v = fibre_.v[p];
     const float z = std::clamp(1 + v * std::log(u.x + (1 - u.x) * std::exp(-2 / v)), -1.0f, 1.0f);
     const SinCos in = tilted(p);
@@ -145,7 +145,7 @@ class FibreView {
   }
 
  private:
-  /// A_p from the Fresnel reflectance f and the transmittance of one segment; all that comes later as one sum.
+  /// A_p from the Fresnel reflectance f and the transmittance of one segment; longer paths as a geometric series.
   void set_attenuation(const Spectrum& transmittance, float f) {
     attenuation_[0] = Spectrum(f);
     attenuation_[1] = transmittance * sqr(1 - f);
@@ -155,18 +155,18 @@ class FibreView {
     for (int p = 0; p <= kLast; ++p) sum += pmf_[p] = luminance(attenuation_[p]);
     for (float& pmf : pmf_) pmf /= sum;
   }
-  /// theta turned by the scales: by 2 alpha, -alpha, -4 alpha.
+  /// Inclination with the tilt of the scales: by 2 alpha, -alpha, -4 alpha.
   SinCos tilted(int p) const {
     if (p == kLast) return theta_;
     const SinCos t = fibre_.tilt[p == 0 ? 1 : p == 1 ? 0 : 2];
     const float s = p == 0 ? -t.sin : t.sin;
     return {theta_.sin * t.cos + theta_.cos * s, std::abs(theta_.cos * t.cos - theta_.sin * s)};
   }
-  /// Phi(p, h), the turn around the fibre without roughness.
+  /// Phi(p, h), the azimuthal change of specular paths.
   float specular_turn(int p) const {
     return 2 * static_cast<float>(p) * gamma_t_ - 2 * gamma_o_ + static_cast<float>(p) * kPi;
   }
-  /// N_p: a logistic distribution, cut to [-pi, pi].
+  /// N_p: a logistic distribution truncated to [-pi, pi].
   float azimuthal(float turn) const {
     const float x = std::abs(std::remainder(turn, kTwoPi)), e = std::exp(-x / fibre_.s);
     return e / (fibre_.s * sqr(1 + e) * fibre_.azimuthal_mass);
@@ -237,7 +237,7 @@ class Hair final : public Bsdf {
   }
   bool needs_derivatives() const override { return true; }
   const Texture* main_texture() const override { return absorption_.texture(); }
-  /// The colour of much hair: [Chiang2016], inverted.
+  /// Multiple-scattering albedo of hair: [Chiang2016], inverted.
   Spectrum albedo(const SurfaceHit& hit) const override {
     return each(absorption(hit), [this](float a) { return std::exp(-std::sqrt(a) * fibre_.colour_d); });
   }
@@ -257,7 +257,7 @@ class Hair final : public Bsdf {
 std::shared_ptr<Bsdf> make_hair(Parameters& parameters) {
   const bool pigments = parameters.has("eumelanin") || parameters.has("pheomelanin");
   if (pigments && parameters.has("sigma_a")) parameters.error("has pigments and 'sigma_a'; expected one of them");
-  // [EonFrancois2011] absorption of one unit of concentration.
+  // [EonFrancois2011] absorption per unit of concentration.
   const Spectrum eumelanin = Spectrum(0.419f, 0.697f, 1.37f) * parameters.get_float("eumelanin", 1.3f, 0);
   const Spectrum pheomelanin = Spectrum(0.187f, 0.4f, 1.05f) * parameters.get_float("pheomelanin", 0.2f, 0);
   TexturePtr absorption = parameters.find_texture("sigma_a", SpectrumRole::kIndex);

@@ -29,7 +29,7 @@ TEST(Hair, WithoutPigmentsKeepsAllLight) {
   }
 }
 
-// A ray along the fibre and one beside its edge; the smoothest fibre.
+// Rays along the fibre and close to its edge; lowest roughness.
 TEST(Hair, IsFiniteAtTheEdges) {
   for (const double roughness : {0.0, 1.0}) {
     const Json hair{{"type", "hair"}, {"longitudinal_roughness", roughness}, {"azimuthal_roughness", roughness}};

@@ -16,7 +16,7 @@ struct NamedIor {
   const char* name;
   float ior;
 };
-// Hecht, "Optics", 4th edition; the names are Mitsuba's.
+// Hecht, "Optics", 4th edition; Mitsuba's names.
 constexpr NamedIor kNamedIors[] = {
     {"vacuum", 1.0f},      {"helium", 1.000036f},        {"hydrogen", 1.000132f},
     {"air", 1.000277f},    {"carbon dioxide", 1.00045f}, {"water", 1.333f},
@@ -78,7 +78,7 @@ ConductorInput get_conductor(Parameters& parameters) {
     parameters.error_at("material", fmt::format("is the unknown conductor '{}'; expected one of none, {}{}", material,
                                                 fmt::join(names, ", "), did_you_mean(material, names)));
   }
-  // The pair eta = 0, k = 1 reflects everything at every angle.
+  // eta = 0, k = 1 reflects everything at every angle.
   return {ColourInput(parameters.get_texture("eta", Spectrum(0), SpectrumRole::kIndex)),
           ColourInput(parameters.get_texture("k", Spectrum(1), SpectrumRole::kIndex))};
 }
@@ -105,7 +105,7 @@ std::vector<BsdfPtr> get_nested_bsdfs(Parameters& parameters, size_t least, size
   size_t n_described = 0;
   for (const Property& property : parameters.object().properties)
     if (const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value)) {
-      if (!*object) return {};  // an unresolved reference, already reported
+      if (!*object) return {};  // unresolved reference, already reported
       if ((*object)->kind == "bsdf") ++n_described;
     }
   std::vector<BsdfPtr> nested = parameters.children<Bsdf>("bsdf");
@@ -115,7 +115,7 @@ std::vector<BsdfPtr> get_nested_bsdfs(Parameters& parameters, size_t least, size
                     least == most ? fmt::format("exactly {}", least) : fmt::format("{} or {}", least, most)));
     return {};
   }
-  // A model that could not be made has left its own error.
+  // A nested model that could not be created has reported its own error.
   if (nested.size() != n_described) return {};
   return nested;
 }

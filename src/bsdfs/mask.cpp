@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// mask: a model with holes, or one that lets a part of the light pass straight through.
+// mask: a model with opacity; the rest of the light passes straight through.
 //
 // | name     | type           | default | meaning                                                             |
 // |----------|----------------|---------|---------------------------------------------------------------------|

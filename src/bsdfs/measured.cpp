@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// measured: a material as it was measured, from a file of RGL's database [DupuyJakob2018]; black from the other side.
+// measured: a measured material from a file of the RGL database [DupuyJakob2018]; black from the other side.
 //
 // | name     | type   | default  | meaning                                                      |
 // |----------|--------|----------|--------------------------------------------------------------|
 // | filename | string | required | a file of the database in RGB, *_rgb.bsdf: see tensor_file.h |
 //
-// With m the half vector, u(m) its angles on the unit square and s the place that the table of visible normals takes to
-// u(m), all by the direction of the camera,
-//     f cos = spectra(s) D(u(m)) / (4 sigma),            [DupuyJakob2018], as Mitsuba has it
-// or spectra(s) alone where the file says so. Samples are drawn from the luminance over s, then taken through the
-// visible normals. Tables are bilinear, and linear between the measured directions of the camera, which so count as
-// they are: the model is not quite reciprocal, and light paths get its adjoint. Channels below 0 are 0.
+// With m the half vector, u(m) its angles on the unit square and s the point that the warp of visible normals maps to
+// u(m), all for the direction of the camera,
+//     f cos = spectra(s) D(u(m)) / (4 sigma),            [DupuyJakob2018], as in Mitsuba,
+// or spectra(s) alone if the file says so. Samples are drawn from the luminance over s, then warped to visible normals.
+// Tables are bilinear, and interpolated linearly between the measured camera directions, so the model is not quite
+// reciprocal, and light paths get its adjoint. Negative channels are clamped to 0.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -27,29 +27,29 @@ namespace covary {
 namespace {
 
 struct Material {
-  ParameterNodes nodes;  ///< azimuth and angle from the normal of the camera's direction
+  ParameterNodes nodes;  ///< azimuth and polar angle of the camera's direction
   bool isotropic = false;
-  /// Into how many parts of equal reflection the azimuth falls: 1, 2 (mirrored at the normal) or 4 (by x and by y).
+  /// Number of symmetric sectors of azimuth: 1, 2 (point symmetry about the normal) or 4 (mirrored in x and in y).
   int parts = 1;
-  bool by_normals = false;  ///< spectra are without D / (4 sigma)
+  bool by_normals = false;  ///< spectra do not include D / (4 sigma)
   BilinearTable<float> ndf, sigma;
   WarpTable visible_normals, luminance;
   BilinearTable<Spectrum> spectra;
 };
 
-/// Angle from z without the loss of digits of an arc cosine near it.
+/// Angle from z, without the cancellation of acos near it.
 float angle_from_z(const Vec3& w) { return 2 * std::asin(std::min(0.5f * length(w - Vec3{0, 0, 1}), 1.0f)); }
-/// Angles on the unit square: the square root spends more of it on the peak.
+/// Maps angles to the unit square; the square root resolves the peak better.
 Vec2 to_square(float theta, float phi) {
   const float turn = phi / kTwoPi + 0.5f;
   return {std::sqrt(theta * 2 / kPi), turn - std::floor(turn)};
 }
 
-/// The material as a camera in direction `wo`, wo.z > 0, sees it.
+/// The material as seen from the camera direction `wo`, wo.z > 0.
 class MaterialView {
  public:
   MaterialView(const Material& material, const Vec3& wo) : material_(material) {
-    // By the symmetry of what was measured, directions lie in the first measured part.
+    // Symmetry maps directions to the measured sector.
     if (material.parts >= 2) flip_y_ = !std::signbit(wo.y);
     flip_x_ = material.parts == 4 ? !std::signbit(wo.x) : flip_y_;
     wo_ = flipped(wo);
@@ -68,14 +68,14 @@ class MaterialView {
       value *= sigma > 0 ? material_.ndf.eval(0, u) / (4 * sigma) : 0;
     }
     // From the unit square to normals, theta = pi/2 u² and phi = 2 pi v - pi, then to directions [Walter2007] Eq. (14).
-    // The square is 0 wide at u = 0: limited as in Mitsuba, within 1e-4 radians of the normal.
+    // The Jacobian vanishes at u = 0: clamped as in Mitsuba, within 1e-4 radians of the normal.
     const float jacobian = std::max(2 * kPi * kPi * u.x * std::sin(theta_m), 1e-6f) * 4 * dot(wo_, m);
     const float density = normal.pdf * material_.luminance.pdf(mix_, normal.uv);
     for (int c = 0; c < 3; ++c) value[c] = std::max(value[c], 0.0f);
     return {value, jacobian > 0 ? density / jacobian : 0};
   }
 
-  /// Nothing where the direction lies below the surface.
+  /// nullopt if the direction is below the surface.
   std::optional<Vec3> sample(Vec2 u) const {
     const Vec2 s = material_.luminance.sample(mix_, {u.y, u.x}).uv;
     const Vec2 at = material_.visible_normals.sample(mix_, s).uv;
@@ -132,7 +132,7 @@ class MeasuredClosure final : public BsdfClosure {
   TransportMode mode_;
 };
 
-/// The part of the light from the direction `wo` that is reflected.
+/// Directional albedo for `wo`.
 Spectrum reflected(const Material& material, const Vec3& wo) {
   constexpr int kSide = 16;
   const MeasuredClosure closure(material, TransportMode::kRadiance);
@@ -161,7 +161,7 @@ class Measured final : public Bsdf {
   Spectrum albedo_;
 };
 
-/// The fields of one file. All errors are Error(kInput) that name the file.
+/// Reads the fields of a file. All errors are Error(kInput) naming the file.
 class MaterialFile {
  public:
   explicit MaterialFile(const std::string& path) : path_(path), file_(path) {}
@@ -180,7 +180,7 @@ class MaterialFile {
     expect("rgb",
            {n_phi, n_theta, 3, static_cast<uint64_t>(of_spectra.height), static_cast<uint64_t>(of_spectra.width)});
     expect("jacobian", {1});
-    // Tables of the visible normals and of the luminance are kept with two sums of them.
+    // The tables of visible normals and luminance are stored with two cumulative sums each.
     require_memory(path_, "a measured material", 3.0 * static_cast<double>(file_.n_bytes()));
 
     m.isotropic = n_phi <= 2;
@@ -200,7 +200,7 @@ class MaterialFile {
  private:
   Error refusal(const std::string& what) const { return {ErrorCode::kInput, path_ + ": " + what}; }
 
-  /// A field of this shape, where 0 stands for any length of at least 2.
+  /// Checks the shape of a field; 0 stands for any length of at least 2.
   void expect(const std::string& field, const std::vector<uint64_t>& shape) const {
     const std::vector<uint64_t>& found = file_.shape(field);
     bool right = found.size() == shape.size();
@@ -231,7 +231,7 @@ class MaterialFile {
       throw refusal(error.what());
     }
   }
-  /// Channel by channel in the file, together here.
+  /// The file stores planar channels; interleaves them.
   std::vector<Spectrum> colours(size_t n_slices, size_t n) const {
     const std::vector<float> planes = file_.floats("rgb");
     std::vector<Spectrum> result(n_slices * n);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The files are those of tests/references/make_measured_files.py.
+// Files written by tests/references/make_measured_files.py.
 #include <cmath>
 #include <fstream>
 #include <sstream>
@@ -44,7 +44,7 @@ TEST(Measured, AlbedoOfTheAuxiliaryImageIsWhatIsReflected) {
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(told[c], drawn[c], 0.02f);
 }
 
-/// The parts that were not measured mirror those that were.
+/// Sectors that were not measured mirror those that were.
 TEST(Measured, PartsOfATurnAreMirrored) {
   const auto value = [](const std::string& file, Vec3 wo, Vec3 wi) {
     return Bound(measured(file), wo)->eval(wo, wi).value.g;
@@ -56,12 +56,12 @@ TEST(Measured, PartsOfATurnAreMirrored) {
   EXPECT_EQ(quarter, value(kFiles[2], turned(wo, -1, 1), turned(wi, -1, 1)));
   EXPECT_EQ(quarter, value(kFiles[2], turned(wo, 1, -1), turned(wi, 1, -1)));
   EXPECT_NE(quarter, value(kFiles[2], wo, turned(wi, -1, 1)));
-  // An isotropic one looks at the difference of azimuths alone.
+  // An isotropic material depends on the difference of azimuths only.
   EXPECT_NEAR(value(kFiles[0], direction(35, 0.4f), direction(50, 3)),
               value(kFiles[0], direction(35, -2.6f), direction(50, 0)), 1e-5f);
 }
 
-/// Fields of a small isotropic material whose spectra are `value` and which is not divided by its normals.
+/// Fields of a small isotropic material with constant spectra `value` that exclude D / (4 sigma).
 std::vector<TensorField> plain_fields(float value) {
   const std::vector<float> ones(8, 1);
   return {float_field("phi_i", {1}, {0}),
@@ -121,7 +121,7 @@ TEST(Measured, WrongFilesAreNamed) {
   expect_contains(bsdf_errors(measured(write(third))), "expected a whole, half or quarter turn");
 }
 
-/// 2,000 files with one byte changed: each loads or is refused with a message; what loads can be sampled.
+/// 2,000 files with one byte changed: each loads or is rejected with a message; those that load can be sampled.
 TEST(Measured, DamagedFilesDoNoHarm) {
   std::ifstream stream(kFiles[0], std::ios::binary);
   std::stringstream whole;
@@ -132,7 +132,7 @@ TEST(Measured, DamagedFilesDoNoHarm) {
     const PathRandom random(Sampling::kIndependent, 1, 0, 0, i);
     const Vec2 u = random.get_2d(0, Event::kDirection);
     std::string bytes = whole.str();
-    // Most of the changes go to the list of fields.
+    // Most changes hit the list of fields.
     const size_t place = static_cast<size_t>(u.x * static_cast<float>(i % 4 ? 400 : bytes.size()));
     bytes[place] = static_cast<char>(u.y * 256);
     const std::string path = test_file("d.bsdf");

@@ -30,13 +30,13 @@ float Microfacet::beckmann_g1(float xy2, float z) {
   if (xy2 == 0) return 1;
   const float a = z / std::sqrt(xy2);  // 1 / (alpha tan(theta))
   if (a > 4) return 1;
-  // [Walter2007] Eq. (26), exact. The rational fit of Eq. (27) (0.35 % off) would leave the density of the visible
-  // normals, which has to match what sample_beckmann draws, without unit integral.
+  // [Walter2007] Eq. (26), exact. With the rational fit of Eq. (27) (0.35 % off), the density of visible normals, which
+  // must match sample_beckmann(), would not integrate to one.
   return 2 / (1 + std::erf(a) + kInvSqrtPi * std::exp(-a * a) / a);
 }
 
 // [HeitzDEon2014]: sample the visible slopes of the unit-roughness surface, then rotate and stretch. The slope along w
-// is found by inverting its cumulative distribution
+// is found by inverting its CDF
 //     C(x) = 1 + x + tan(theta) exp(-erfinv(x)^2) / sqrt(pi),  x = erf(slope) in (-1, erf(cot theta)),
 // with Newton's method from the solution for grazing incidence ([Jakob2014]): monotone and continuous in u.
 Vec3 Microfacet::sample_beckmann(const Vec3& w, Vec2 u) const {
@@ -45,7 +45,7 @@ Vec3 Microfacet::sample_beckmann(const Vec3& w, Vec2 u) const {
   const float cos_phi = sin_v > 0 ? v.x / sin_v : 1, sin_phi = sin_v > 0 ? v.y / sin_v : 0;
   u = {std::clamp(u.x, 1e-6f, 1 - 1e-6f), std::clamp(u.y, 1e-6f, 1 - 1e-6f)};
 
-  const float tan_v = sin_v / v.z, cot_v = v.z / sin_v;  // cot may be infinite; erf and exp take it
+  const float tan_v = sin_v / v.z, cot_v = v.z / sin_v;  // cot may be infinite; erf and exp handle it
   const float x_max = std::erf(cot_v);
   const float target = u.x * (1 + x_max + kInvSqrtPi * tan_v * std::exp(-cot_v * cot_v));
   float x = x_max - (x_max + 1) * std::erf(std::sqrt(-std::log(u.x)));

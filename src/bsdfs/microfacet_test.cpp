@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Fresnel equations against closed forms and conservation laws; microfacet distributions against their normalisation,
-// their masking integral, and the visible normals they draw.
+// their masking integral and their sampling of visible normals.
 #include "bsdfs/microfacet.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ TEST(Fresnel, DielectricKnownValues) {
   EXPECT_NEAR(fresnel_dielectric(-1, 1.5f).reflectance, 0.04f, 1e-7f);
   EXPECT_EQ(fresnel_dielectric(0, 1.5f).reflectance, 1);
   EXPECT_EQ(fresnel_dielectric(0.3f, 1).reflectance, 0);
-  // Brewster's angle tan(theta) = eta: only the perpendicular component is left, ((1 - eta^2) / (1 + eta^2))^2 / 2.
+  // Brewster's angle tan(theta) = eta: only the perpendicular component remains, ((1 - eta^2) / (1 + eta^2))^2 / 2.
   EXPECT_NEAR(fresnel_dielectric(1 / std::sqrt(1 + 1.5f * 1.5f), 1.5f).reflectance, 0.5f * sqr(1.25f / 3.25f), 1e-7f);
 }
 
@@ -53,7 +53,7 @@ TEST(Fresnel, ConductorMatchesComplexArithmetic) {
   for (const Complex index : {Complex(0.2, 3.9), Complex(1.1, 2.4), Complex(1.5, 0), Complex(0, 1)})
     for (int i = 0; i <= 20; ++i) {
       const double c = i / 20.0;
-      const Complex t = std::sqrt(index * index - (1 - c * c));  // index times the cosine of refraction
+      const Complex t = std::sqrt(index * index - (1 - c * c));  // index times the cosine of the refracted angle
       const double rs = std::norm((c - t) / (c + t));
       const double rp = std::norm((index * index * c - t) / (index * index * c + t));
       EXPECT_NEAR(fresnel_conductor(static_cast<float>(c), index.real(), index.imag()), (rs + rp) / 2, 5e-6)
@@ -104,7 +104,7 @@ Vec3 direction(float theta, float phi) {
   return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
 }
 
-/// Integral over normals, parameterised so that distributions of any roughness are smooth: tan(theta) = alpha tan(a).
+/// Integral over normals, parameterised by tan(theta) = alpha tan(a) so that the integrand is smooth at any roughness.
 template <typename F>
 double integrate_normals(const Case& c, const F& f) {
   constexpr int kSteps = 500;
@@ -128,8 +128,8 @@ TEST(Microfacet, ProjectedAreaIsOne) {
   }
 }
 
-// The projected area visible from w is cos(theta_w) (Heitz 2014, "Understanding the Masking-Shadowing Function"),
-// which fixes G1: the reason for the exact form of Beckmann's.
+// The projected area visible from w is cos(theta_w) (Heitz 2014, "Understanding the Masking-Shadowing Function"). This
+// determines G1, and is why Beckmann's needs the exact form.
 TEST(Microfacet, VisibleAreaIsTheCosine) {
   for (const Case& c : kCases) {
     const Microfacet d(c.type, c.alpha_u, c.alpha_v);
@@ -171,7 +171,7 @@ TEST(Microfacet, SamplesAreVisibleNormals) {
   }
 }
 
-// Planted bugs: samples of a 5 % rougher surface, all normals instead of the visible ones, the anisotropy swapped.
+// Planted bugs: sampling a 5 % rougher surface, all normals instead of the visible ones, swapped anisotropy.
 TEST(Microfacet, PlantedBugsAreRejected) {
   const Vec3 w = direction(0.9f, 0.6f), up{0, 0, 1};
   const auto rejects = [&](const Microfacet& drawn, const Vec3& w_drawn, const Microfacet& claimed) {

@@ -27,7 +27,7 @@ class NormalMap final : public PerturbingBsdf {
     const Vec3 stored{2 * c.r - 1, 2 * c.g - 1, 2 * c.b - 1};
     const float l = length(stored);
     if (!(l > 0)) return model.here;
-    // From the frame along dp/du to the local shading frame; the same when the two coincide.
+    // From the frame along dp/du to the local shading frame; identity if they coincide.
     const Frame uv = Frame::from_tangent({0, 0, 1}, hit.frame.to_local(hit.dp_du));
     return make_perturbed(model, {uv.to_world(stored * (1 / l)), uv.s, flip_invalid_, shadow_terminator_}, mode, arena);
   }

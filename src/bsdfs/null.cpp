@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// null: a surface that is not there; light passes straight through. It has no parameters.
+// null: an index-matched surface; light passes straight through. No parameters.
 #include "bsdfs/registry.h"
 
 namespace covary {

@@ -25,7 +25,7 @@ class PerturbedClosure final : public BsdfClosure {
     if (wo.z == 0 || wi.z == 0) return {};
     const bool flip = flips(wo);
     BsdfValue v = eval_in(frame(flip), *nested_, wo, wi);
-    if (mode_ == TransportMode::kImportance && differs_for(wi, flip))  // the camera's direction decides about the value
+    if (mode_ == TransportMode::kImportance && differs_for(wi, flip))  // the camera's direction determines the value
       v.value = eval_in(frame(flips(wi)), nested(wi), wo, wi).value;
     return v;
   }
@@ -36,7 +36,7 @@ class PerturbedClosure final : public BsdfClosure {
     const Vec3 po = f.to_local(wo);
     BsdfSample s = nested_->sample(po, u_lobe, u);
     if (!s.valid()) return s;
-    if (s.flags & kNullTransmission) {  // passes as if there were no surface
+    if (s.flags & kNullTransmission) {  // passes unaffected by the perturbation
       s.wi = -wo;
       return s;
     }
@@ -77,18 +77,18 @@ class PerturbedClosure final : public BsdfClosure {
     in_frame.wi = f.to_local(s.wi);
     const Vec3 po = f.to_local(wo);
     if (s.flags & kNullTransmission) return nested(s.wi).reverse_pmf(po, in_frame);
-    // A delta pair holds in one frame and one model, and leaves the surface on the side it seems to.
+    // A reversed delta pair needs the same frame and model, and must leave on the side it appears to.
     return flip == flips(wo) && &nested(wo) == &nested(s.wi) && wo.z * po.z > 0 ? nested_->reverse_pmf(po, in_frame)
                                                                                 : 0;
   }
 
  private:
-  /// Whether the normal is turned about z for the camera's direction w.
+  /// Whether the normal is flipped (rotated by 180 degrees about z) for the camera direction w.
   bool flips(const Vec3& w) const { return flip_invalid_ && w.z * dot(w, frame_.n) <= 0; }
   const Frame& frame(bool flip) const { return flip ? flipped_frame_ : frame_; }
-  /// The nested model for a path that arrives from w.
+  /// The nested model for a path arriving from w.
   const BsdfClosure& nested(const Vec3& w) const { return (w.z > 0) == front_ ? *nested_ : *beyond_; }
-  /// Whether a path that arrives from w meets another frame than `flip` says, or another model than nested_.
+  /// Whether a path arriving from w uses another frame than `flip` says, or another model than nested_.
   bool differs_for(const Vec3& w, bool flip) const { return flips(w) != flip || &nested(w) != nested_; }
 
   BsdfValue eval_in(const Frame& f, const BsdfClosure& nested, const Vec3& wo, const Vec3& wi) const {
@@ -98,14 +98,14 @@ class PerturbedClosure final : public BsdfClosure {
     if (!(wi.z * pi.z > 0)) v.pdf_solid_angle = 0;  // sample() drops it
     return v;
   }
-  /// Value over the nested model's value; `po`, `pi` are wo, wi in the perturbed frame.
+  /// Ratio of the value to the nested model's; `po`, `pi` are wo, wi in the perturbed frame.
   float factor(const Vec3& wo, const Vec3& wi, const Vec3& po, const Vec3& pi) const {
     if (mode_ == TransportMode::kRadiance) return wi.z * pi.z > 0 ? terminator(wi) : 0;
-    // Adjoint: the light comes from wo, and its cosine in the perturbed frame replaces that of wi.
+    // Adjoint: light arrives from wo, so its cosine in the perturbed frame takes the place of wi's.
     if (!(wo.z * po.z > 0) || pi.z == 0) return 0;
     return terminator(wo) * std::abs(po.z * wi.z / (wo.z * pi.z));
   }
-  /// [Estevez2019] GGX shadowing of the light's direction.
+  /// [Estevez2019] GGX shadowing for the light's direction.
   float terminator(const Vec3& w) const { return alpha2_ > 0 ? 2 / (1 + std::sqrt(1 + alpha2_ * tan2_theta(w))) : 1; }
 
   const BsdfClosure *nested_, *beyond_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A model whose shading normal is perturbed, for bump and normal maps.
+// A model with a perturbed shading normal, for bump and normal maps.
 #pragma once
 
 #include "bsdfs/inputs.h"
@@ -7,14 +7,14 @@
 namespace covary {
 
 struct Perturbation {
-  Vec3 normal;             ///< unit, in the local shading frame, z > 0 in most cases
-  Vec3 tangent;            ///< direction the perturbed frame's s axis follows, in the local shading frame
-  bool flip_invalid;       ///< turn the normal about z where it would face away from the camera's side
+  Vec3 normal;             ///< unit, in the local shading frame, usually z > 0
+  Vec3 tangent;            ///< direction of the perturbed frame's s axis, in the local shading frame
+  bool flip_invalid;       ///< flip the normal about z if it faces away from the camera's side
   bool shadow_terminator;  ///< soften the transition to shadow at grazing light
 };
 
-/// The nested model, bound for the side of wo, and for the other side where that differs and a direction on it can
-/// reach the model: without flip_invalid a path may see the tilted surface from behind.
+/// The nested model, bound for the side of wo, and also for the other side if that differs and can be reached: without
+/// flip_invalid a path may see the tilted surface from behind.
 struct PerturbedModel {
   const BsdfClosure* here;
   const BsdfClosure* beyond;
@@ -28,21 +28,21 @@ struct PerturbedModel {
   }
 };
 
-/// `model` as if the surface had the perturbed normal. Lives in the arena like every closure.
+/// `model` with the perturbed normal. Allocated in the arena like every closure.
 ///
 /// flip_invalid after Schüßler et al. 2017, "Microfacet-based Normal Mapping for Robust Monte Carlo Path Tracing";
 /// shadow_terminator after Estevez et al. 2019, "A Microfacet-Based Shadowing Function to Solve the Bump Terminator
-/// Problem". Light that would leave through the unperturbed surface is dropped, so energy may be lost, never gained
+/// Problem". Light that would leave through the unperturbed surface is dropped, so energy may be lost but never gained
 /// through the back.
 ///
-/// The value is not symmetric: light and camera play different parts. For importance it is the exact adjoint of the
-/// value for radiance, f*(wo, wi) = f(wi, wo), so that light and camera paths estimate the same image. Some pairs of
-/// directions whose two sides choose different flips are found from the camera only: mirror reflections among them
-/// carry no importance, and the densities of the light's side (reverse_pdf, reverse_pmf) are 0.
+/// The value is not symmetric in light and camera. For importance it is the exact adjoint of the value for radiance,
+/// f*(wo, wi) = f(wi, wo), so that light and camera paths estimate the same image. Some pairs of directions whose two
+/// sides choose different flips are found from the camera only: mirror reflections among them carry no importance, and
+/// the densities of the light's side (reverse_pdf, reverse_pmf) are 0.
 const BsdfClosure* make_perturbed(const PerturbedModel& model, const Perturbation& perturbation, TransportMode mode,
                                   Arena& arena);
 
-/// A model around another one, whose normal it perturbs as its parameters say.
+/// Wraps a model and perturbs its normal according to its parameters.
 class PerturbingBsdf : public Bsdf {
  public:
   uint32_t flags() const final { return nested_->flags(); }

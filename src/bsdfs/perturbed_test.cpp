@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// bumpmap and normalmap, which differ only in where the normal comes from.
+// bumpmap and normalmap, which differ only in the source of the normal.
 #include "support/model_checks.h"
 
 namespace covary::testing::perturbed_test {
@@ -21,7 +21,7 @@ TEST(BumpMap, FlatMapChangesNothing) {
 }
 
 TEST(BumpMap, TiltsTheNormalAgainstTheSlope) {
-  // Height rising with u by 0.5 per unit: normal along (-0.5, 0, 1). A mirror reflects about it.
+  // Height rises with u by 0.5 per unit: normal along (-0.5, 0, 1). Mirror reflection is about it.
   const Vec3 n = normalize({-0.5f, 0, 1}), wo = direction(10, 2);
   const BsdfSample s = Bound(bump({{"type", "conductor"}}), wo, TransportMode::kRadiance, height(0.5f, 0))
                            ->sample(wo, 0.5f, {0.5f, 0.5f});
@@ -79,7 +79,7 @@ TEST(NormalMap, StoredNormalTurnsTheMirror) {
 }
 
 TEST(NormalMap, FollowsTheTangent) {
-  // With dp/du along y the stored x component points along y.
+  // With dp/du along y, the stored x component points along y.
   const BsdfPtr bsdf =
       make_bsdf({{"type", "normalmap"}, {"normalmap", rgb(0.6, 0.3, 0.9)}, {"n", {{"type", "conductor"}}}});
   SurfaceHit hit = flat_hit();

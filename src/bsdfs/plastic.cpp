@@ -4,15 +4,15 @@
 // | name                 | type           | default       | meaning                                                 |
 // |----------------------|----------------|---------------|---------------------------------------------------------|
 // | diffuse_reflectance  | colour/texture | 0.5           | reflectance of the base                                 |
-// | nonlinear            | bool           | false         | colour shift by repeated scattering inside the coating  |
+// | nonlinear            | bool           | false         | colour shift by multiple scattering inside the coating  |
 // | int_ior              | number/string  | polypropylene | index of refraction of the coating                      |
 // | ext_ior              | number/string  | air           | index of refraction outside                             |
 // | specular_reflectance | colour/texture | 1             | factor on the mirror reflection; not physical unless 1  |
 //
-// The light that enters, 1 - F(wi), scatters at the base and leaves with 1 - F(wo), or is thrown back inside with the
-// mean internal reflectance Fi and scatters again. Summing the bounces (a geometric series):
+// The fraction of light that enters, 1 - F(wi), scatters at the base and leaves with 1 - F(wo), or is reflected back
+// inside with the mean internal reflectance Fi and scatters again. Summing the bounces (a geometric series):
 //     f_diffuse = (1 - F(wi)) (1 - F(wo)) rho / (pi eta^2 (1 - rho Fi))
-// Without `nonlinear` the denominator has Fi in place of rho Fi, which keeps the hue of textures.
+// Without `nonlinear` the denominator has Fi in place of rho Fi, which preserves the hue of textures.
 #include "bsdfs/coated.h"
 #include "bsdfs/fresnel.h"
 #include "bsdfs/registry.h"
@@ -60,7 +60,7 @@ class PlasticClosure final : public BsdfClosure {
 
  private:
   float fresnel(const Vec3& w) const { return fresnel_dielectric(w.z, eta_).reflectance; }
-  /// Probability of the mirror lobe, by the Fresnel reflectance and the mean colours.
+  /// Probability of the mirror lobe, from the Fresnel reflectance and mean colours.
   float specular_pmf(float f_o) const {
     const float specular = f_o * specular_weight_, diffuse = (1 - f_o) * (1 - specular_weight_);
     return specular + diffuse > 0 ? specular / (specular + diffuse) : 1;

@@ -4,8 +4,8 @@
 namespace covary::testing {
 namespace {
 
-// A white base absorbs nothing, so that all light comes back: F(wo) by the mirror lobe, the rest by the diffuse one.
-// The two fits of the mean Fresnel reflectance are good to 0.2 %, which the trapped light (60 %) makes 0.5 %.
+// A white base absorbs nothing, so all light returns: F(wo) by the mirror lobe, the rest by the diffuse one. The two
+// fits of the mean Fresnel reflectance are accurate to 0.2 %, amplified to 0.5 % by the trapped light (60 %).
 TEST(Plastic, WhiteBaseReflectsEverything) {
   for (const double ior : {1.3, 1.49, 1.8})
     for (const float theta : {5.0f, 50.0f, 80.0f})

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// `polarizer`, `circular`, `retarder`: films that act on the polarisation of light. Light is not polarised here, and of
-// such light they let pass, straight through, what Mitsuba's variants without polarisation do: half of it times the
-// transmittance for polarisers, all of it times the transmittance for retarders.
+// `polarizer`, `circular`, `retarder`: filters that act on polarisation. This renderer is unpolarised; like Mitsuba's
+// unpolarised variants, polarisers transmit half of the light and retarders all of it, straight through, times the
+// transmittance.
 //
 // | name          | of         | type           | default | meaning                   |
 // |---------------|------------|----------------|---------|---------------------------|

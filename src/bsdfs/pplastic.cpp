@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// pplastic: the plastic of Baek et al. 2018 for light that is not polarised: microfacets of a dielectric above a
-// diffuse base, on the side of the normal; black from the other side.
+// pplastic: the plastic of Baek et al. 2018 for unpolarised light: dielectric microfacets above a diffuse base, on the
+// side of the normal; black from the other side.
 //
 // | name                 | type           | default       | meaning                                             |
 // |----------------------|----------------|---------------|-----------------------------------------------------|
@@ -12,7 +12,7 @@
 // | distribution         | string         | beckmann      | distribution of microfacet normals: beckmann or ggx |
 // | alpha, alpha_u, alpha_v, sample_visible |  |           | see roughness.h                                     |
 //
-// f = F D G / (4 cos cos) + rho / pi (1 - F(wo)) (1 - F(wi)), as Mitsuba's variants without polarisation.
+// f = F D G / (4 cos cos) + rho / pi (1 - F(wo)) (1 - F(wi)), as in Mitsuba's unpolarised variants.
 #include "bsdfs/coated.h"
 #include "bsdfs/fresnel.h"
 #include "bsdfs/registry.h"

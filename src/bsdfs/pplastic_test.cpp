@@ -23,7 +23,7 @@ TEST(PPlastic, IsReciprocal) {
   for (const Json& plastic : plastics()) EXPECT_GT(expect_adjoint(plastic, {5, 45, 75}), 200);
 }
 
-/// Two refractions at the surface: (1 - F(30 degrees)) (1 - F(60 degrees)) rho / pi cos, by hand for an index of 1.5.
+/// Refraction into and out of the base: (1 - F(30 degrees)) (1 - F(60 degrees)) rho / pi cos, by hand for index 1.5.
 TEST(PPlastic, BaseIsSeenThroughTheSurfaceTwice) {
   const Json smooth{{"type", "pplastic"}, {"alpha", 0.01}, {"eta", 1.5}, {"diffuse_reflectance", 0.8}};
   const Vec3 wo = direction(30, 0), wi = direction(60, 1.5f);
@@ -35,7 +35,7 @@ TEST(PPlastic, WrongParametersAreNamed) {
   expect_contains(bsdf_errors({{"type", "pplastic"}, {"eta", 1.0}}), "'eta' is 1");
 }
 
-/// Of light that is not polarised a polariser lets half pass, a retarder all, each times its transmittance.
+/// Unpolarised light: a polariser transmits half, a retarder all, each times its transmittance.
 TEST(PolarisingFilms, LetThroughWhatMitsubaDoes) {
   const Vec3 wo = direction(40, 0.3f);
   const auto weight = [&](const char* type) {

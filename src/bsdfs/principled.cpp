@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// principled: one artist-friendly model for metals, plastics, coated and transmitting materials ([Burley2012] and
+// principled: an artist-friendly model for metals, plastics, coated and transmissive materials ([Burley2012] and
 // [Burley2015]).
 //
 // | name                              | type           | default | meaning                                           |
@@ -16,15 +16,15 @@
 // | flatness                          | number/texture | 0       | blends diffuse and subsurface appearance          |
 // | clearcoat                         | number/texture | 0       | second, isotropic highlight                       |
 // | clearcoat_gloss                   | number/texture | 0       | 0: satin (alpha 0.1), 1: gloss (alpha 0.001)      |
-// | diffuse_reflectance_sampling_rate | number         | 1       | factors on the probability with which a lobe is   |
+// | diffuse_reflectance_sampling_rate | number         | 1       | factors on the probability that a lobe is         |
 // | main_specular_sampling_rate       | number         | 1       |   sampled; they change noise, never the value     |
 // | clearcoat_sampling_rate           | number         | 1       |                                                   |
 //
-// Numbers are in [0, 1] but for eta and the rates. The side opposite the normal is inside the material: it reflects and
-// refracts when spec_trans > 0, otherwise it is black. With eta = 1 nothing is reflected by the main lobe, metal
-// included, and with spec_trans the index 1 is replaced by 1.001; scenes rely on both.
+// Numbers are in [0, 1] except eta and the rates. The side opposite the normal is inside the material: it reflects and
+// refracts if spec_trans > 0, otherwise it is black. With eta = 1 the main lobe, metal included, reflects nothing, and
+// with spec_trans an index of 1 is replaced by 1.001; scenes rely on both.
 //
-// Lobes: 0 diffuse and sheen (cosine distribution), 1 clearcoat (GTR1 normals), 2 main specular (visible GGX normals;
+// Lobes: 0 diffuse and sheen (cosine-weighted), 1 clearcoat (GTR1 normals), 2 main specular (visible GGX normals;
 // reflection or refraction is chosen by the energy of each at the sampled normal). Lobe probabilities follow estimates
 // of each lobe's albedo for wo.
 #include "bsdfs/principled_terms.h"
@@ -52,7 +52,7 @@ class Gtr1 {
   float alpha2_, scale_;
 };
 
-/// The parameters: as inputs, or at one point.
+/// The parameters, either as inputs or evaluated at a point.
 template <typename Colour, typename Number>
 struct PrincipledParameters {
   Colour base_color;
@@ -82,8 +82,8 @@ class PrincipledClosure final : public BsdfClosure {
     diffuse_ = p.base_color * (diffuse * kInvPi);
     if (diffuse > 0 && p.sheen > 0)
       sheen_ = lerp(p.sheen_tint, Spectrum(1), principled_tint(p.base_color)) * (p.sheen * (1 - p.metallic));
-    // Reflectance F(c) = dielectric F_d(c) + r0 + rise w(c), with Schlick's weight w, is the blend of a dielectric, a
-    // metal (r0 = base colour) and a tinted dielectric ([Burley2012] section 5.5).
+    // Reflectance F(c) = dielectric F_d(c) + r0 + rise w(c), with Schlick's weight w, blends a dielectric, a metal (r0
+    // = base colour) and a tinted dielectric ([Burley2012] section 5.5).
     dielectric_ = (1 - p.metallic) * (1 - p.spec_tint);
     r0_ = p.base_color * p.metallic;
     if (p.spec_tint > 0)
@@ -130,7 +130,7 @@ class PrincipledClosure final : public BsdfClosure {
     } else {
       return {};
     }
-    // A normal that is visible may still send the ray to the wrong side of the surface.
+    // A visible normal may still send the ray to the wrong side of the surface.
     if (!(kind == kGlossyTransmission ? i.z < 0 : i.z > 0)) return {};
     const Terms t = terms(view, i);
     const float pdf = t.mixture(view);
@@ -153,8 +153,8 @@ class PrincipledClosure final : public BsdfClosure {
  private:
   enum Lobe : uint32_t { kDiffuse, kClearcoat, kSpecular, kLobes };
 
-  /// What depends on wo alone. All is computed as seen from the side of wo: directions on the back are negated and the
-  /// index is inverted there.
+  /// Terms that depend on wo alone, as seen from the side of wo: on the back, directions are negated and the index is
+  /// inverted.
   struct View {
     View(const PrincipledClosure& closure, const Vec3& wo) : front(wo.z > 0), o(front ? wo : -wo) {
       eta = front ? closure.eta_ : 1 / closure.eta_;
@@ -177,7 +177,7 @@ class PrincipledClosure final : public BsdfClosure {
       view.pmf[kSpecular] = 1;
       return;
     }
-    // Estimates of albedo, from a mirror-like surface.
+    // Albedo estimates, as for a mirror-like surface.
     const DielectricFresnel f = fresnel_dielectric(view.o.z, eta_);
     const float specular =
         specular_rate_ * (mean(specular_reflectance(view, view.o.z, f)) + refraction_weight_ * (1 - f.reflectance));
@@ -189,15 +189,15 @@ class PrincipledClosure final : public BsdfClosure {
     view.pmf[kSpecular] = specular / sum;
   }
 
-  /// Schlick's weight for the angle on the thinner side of the surface.
+  /// Schlick's weight for the angle on the optically thinner side.
   float schlick(float c, const DielectricFresnel& f) const { return schlick_weight(eta_ > 1 ? c : -f.cos_theta_t); }
-  /// Reflectance of the microfacets of the main lobe; `c`: cosine between o and their normal.
+  /// Microfacet reflectance of the main lobe; `c`: cosine between o and the microfacet normal.
   Spectrum specular_reflectance(const View& view, float c, const DielectricFresnel& f) const {
     if (f.reflectance == 0) return {};  // only for eta = 1
     if (!view.front) return Spectrum(refraction_ * f.reflectance);
     return Spectrum(dielectric_ * f.reflectance) + r0_ + rise_ * schlick(c, f);
   }
-  /// Probability of reflection, rather than refraction, at a sampled normal.
+  /// Probability of reflection rather than refraction at a sampled normal.
   float reflection_pmf(const Spectrum& reflectance, const DielectricFresnel& f) const {
     const float r = mean(reflectance), t = refraction_weight_ * (1 - f.reflectance);
     return r + t > 0 ? r / (r + t) : 0;
@@ -217,7 +217,7 @@ class PrincipledClosure final : public BsdfClosure {
     const Vec3 h = normalize(o + i);
     const float c = dot(o, h);
     const DielectricFresnel f = fresnel_dielectric(c, view.eta);
-    // Density of visible normals times dm/di = 1 / (4 c), and the value after Torrance and Sparrow.
+    // Density of visible normals times dm/di = 1 / (4 c); value after Torrance and Sparrow.
     const float visible = 0.25f * distribution_.eval(h) * distribution_.smith_g1_over_cos(o);
     const Spectrum reflectance = specular_reflectance(view, c, f);
     t.pdf[kSpecular] = visible * (refraction_ == 0 ? 1 : reflection_pmf(reflectance, f));
@@ -266,7 +266,7 @@ class Principled final : public Bsdf {
         settings_(settings),
         anisotropic_(!in_.anisotropic.is_constant() || in_.anisotropic.constant() > 0),
         refracts_(!in_.spec_trans.is_constant() || in_.spec_trans.constant() > 0),
-        // Where no parameter is textured the closure is the same everywhere.
+        // If no parameter is textured, all points share the same closures.
         constant_(in_.base_color.is_constant() && numbers_are_constant()),
         constant_closures_{{constant_point(), settings, TransportMode::kRadiance},
                            {constant_point(), settings, TransportMode::kImportance}} {}

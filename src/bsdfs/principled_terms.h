@@ -10,7 +10,7 @@
 
 namespace covary {
 
-/// A number in [0, highest]: textures are clamped, constants outside are an error.
+/// A number in [0, highest]: textures are clamped; constants out of range are an error.
 inline NumberInput get_fraction(Parameters& parameters, const std::string& name, float fallback, float highest = 1) {
   NumberInput input(parameters.get_texture(name, fallback));
   if (input.is_constant() && !(input.constant() >= 0 && input.constant() <= highest))
@@ -18,21 +18,21 @@ inline NumberInput get_fraction(Parameters& parameters, const std::string& name,
   return input;
 }
 
-/// GGX with the roughness of [Burley2012] section 5.4: alpha = roughness^2, stretched to keep the area of highlights.
+/// GGX with the roughness of [Burley2012] section 5.4: alpha = roughness^2, stretched so that the area of highlights is
+/// kept.
 inline Microfacet principled_distribution(float roughness, float anisotropic) {
   const float aspect = std::sqrt(1 - 0.9f * anisotropic), alpha = sqr(roughness);
   return {MicrofacetType::kGgx, std::max(0.001f, alpha / aspect), std::max(0.001f, alpha * aspect)};
 }
 
-/// Hue and saturation of a colour: the colour of unit luminance; white for black.
+/// The colour scaled to unit luminance: its hue and saturation; white for black.
 inline Spectrum principled_tint(const Spectrum& colour) {
   const float l = luminance(colour);
   return l > 0 ? colour / l : Spectrum(1);
 }
 
 /// Diffuse reflection with retro-reflection ([Burley2012] section 5.3), blended by `flatness` with an approximation of
-/// subsurface scattering after Hanrahan and Krueger, relative to Lambert's. `cos_d`: cosine between wi and the half
-/// vector.
+/// Hanrahan-Krueger subsurface scattering, relative to a Lambertian. `cos_d`: cosine between wi and the half vector.
 inline float principled_diffuse(float cos_o, float cos_i, float cos_d, float roughness, float flatness) {
   const float w_o = schlick_weight(cos_o), w_i = schlick_weight(cos_i);
   const float rr = 2 * roughness * sqr(cos_d);

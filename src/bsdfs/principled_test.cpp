@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // principled and principledthin: values against Mitsuba 3 (tests/references/make_principled_references.py), sampling
-// against the claimed densities, reciprocity, energy, and the messages for wrong parameters.
+// against densities, reciprocity, energy, and error messages for wrong parameters.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -30,7 +30,7 @@ const BsdfClosure* bind(const BsdfPtr& bsdf, Arena& arena, TransportMode mode = 
   return bsdf->bind(flat_hit(), true, mode, arena);
 }
 
-/// One case for each kind of lobe and mixture, with moderate and narrow highlights.
+/// One case per lobe and mixture of lobes, with moderate and narrow highlights.
 std::vector<Json> materials() {
   const Json c = rgb(0.7, 0.4, 0.1);
   return {
@@ -83,7 +83,7 @@ TEST(Principled, ValuesAreThoseOfMitsuba) {
       const BsdfValue value = closure->eval(vector(pair[0]), vector(pair[1]));
       for (int c = 0; c < 3; ++c, ++n_compared) {
         const double e = expected.is_number() ? 0 : expected[c].get<double>();
-        // Single precision on both sides; the density of a narrow highlight multiplies the rounding of directions.
+        // Single precision on both sides; in a narrow highlight the density amplifies rounding of directions.
         EXPECT_NEAR(value.value[c], e, 1e-3 * e + 2e-6)
             << reference.at("bsdf").dump() << "\npair " << i << " " << pair.dump() << ", channel " << c;
       }
@@ -92,7 +92,7 @@ TEST(Principled, ValuesAreThoseOfMitsuba) {
   EXPECT_GT(n_compared, 10000);
 }
 
-// N = 100 000 in 64 cells, alpha = 5e-7 for each of up to 5 comparisons a direction: detects a density wrong by 3.5 %
+// N = 100 000 in 64 cells, alpha = 5e-7 for each of up to 5 comparisons per direction: detects a density wrong by 3.5 %
 // rms with power 0.99 (statistics/chi2.h). Planted bug: PlantedBugsAreRejected.
 TEST(Principled, SamplesFollowTheDensities) {
   for (const Json& material : materials()) {
@@ -109,7 +109,7 @@ TEST(Principled, SamplesFollowTheDensities) {
   }
 }
 
-/// Claims a density 2 % too high, or reuses one number for two decisions.
+/// Claims a density 2 % too high, or reuses one random number for two decisions.
 class Planted final : public BsdfClosure {
  public:
   Planted(const BsdfClosure& right, bool reuse) : right_(right), reuse_(reuse) {}
@@ -145,8 +145,8 @@ TEST(Principled, PlantedBugsAreRejected) {
   EXPECT_NE(join(check_closure(Planted(*closure, true), direction(40, 0.7f), options)), "");
 }
 
-// The mean weight of N = 200 000 samples is the directional albedo by quadrature; alpha = 5e-7. With sigma about the
-// mean the smallest bias seen with power 0.99 is 1.7 %. Planted bug: the cosine-free value.
+// The mean weight of N = 200 000 samples against the directional albedo by quadrature; alpha = 5e-7. With sigma about
+// equal to the mean, a bias of 1.7 % is detected with power 0.99. Planted bug: the value without its cosine.
 TEST(Principled, WeightsIntegrateToTheAlbedo) {
   for (const Json& material : materials()) {
     const BsdfPtr bsdf = make_bsdf(material);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// principledthin: the thin-surface variant of `principled` ([Burley2015]), for leaves, paper,
-// curtains and panes modelled as a single sheet. Both sides look alike; light passes without being bent.
+// principledthin: the thin-surface variant of `principled` ([Burley2015]), for leaves, paper, curtains and panes
+// modelled as a single sheet. Both sides look alike; transmission is not refracted.
 //
 // | name                                 | type           | default | meaning                                         |
 // |--------------------------------------|----------------|---------|-------------------------------------------------|
-// | base_color                           | colour/texture | 0.5     | colour of all parts but untinted reflection     |
+// | base_color                           | colour/texture | 0.5     | colour of all but untinted reflection           |
 // | roughness                            | number/texture | 0.5     | GGX alpha is its square, at least 0.001         |
 // | anisotropic                          | number/texture | 0       | stretches highlights along dp/du                |
 // | spec_trans                           | number/texture | 0       | blends diffuse and specular parts               |
@@ -12,8 +12,8 @@
 // | spec_tint                            | number/texture | 0       | tints specular reflection by base_color         |
 // | sheen, sheen_tint                    | number/texture | 0       | grazing reflection of cloth, and its tint       |
 // | flatness                             | number/texture | 0       | blends diffuse and subsurface appearance        |
-// | diff_trans                           | number/texture | 0       | share of diffuse light let through; 2: all      |
-// | specular_reflectance_sampling_rate   | number         | 1       | factors on the probability with which a lobe is |
+// | diff_trans                           | number/texture | 0       | diffuse transmission; 1: half, 2: all of it     |
+// | specular_reflectance_sampling_rate   | number         | 1       | factors on the probability that a lobe is       |
 // | specular_transmittance_sampling_rate | number         | 1       |   sampled; they change noise, never the value   |
 // | diffuse_reflectance_sampling_rate    | number         | 1       |                                                 |
 // | diffuse_transmittance_sampling_rate  | number         | 1       |                                                 |
@@ -27,7 +27,7 @@
 namespace covary {
 namespace {
 
-/// The parameters: as inputs, or at one point.
+/// The parameters, either as inputs or evaluated at a point.
 template <typename Colour, typename Number>
 struct ThinParameters {
   Colour base_color;
@@ -82,7 +82,7 @@ class ThinClosure final : public BsdfClosure {
     uint32_t lobe = 0;
     for (float bound = pmf[0]; lobe < kDiffuseTransmit && u_lobe >= bound; bound += pmf[++lobe]) {
     }
-    while (lobe > 0 && pmf[lobe] == 0) --lobe;  // rounding past the last lobe in use
+    while (lobe > 0 && pmf[lobe] == 0) --lobe;  // rounding past the last active lobe
     Vec3 i = lobe == kReflect    ? reflect(o, reflection_.sample(o, u).m)
              : lobe == kTransmit ? reflect(o, transmission_.sample(o, u).m)
                                  : warp::square_to_cosine_hemisphere(u);
@@ -125,8 +125,8 @@ class ThinClosure final : public BsdfClosure {
     }
   };
 
-  /// Estimates of each lobe's albedo, normalised. The Fresnel term is kept from 0 and 1: that of tilted microfacets
-  /// differs.
+  /// Normalised estimates of each lobe's albedo. The Fresnel term is kept away from 0 and 1, because that of tilted
+  /// microfacets differs.
   void probabilities(const Vec3& o, float* pmf) const {
     float f = 0;
     if (specular_ > 0) f = std::clamp(fresnel_dielectric(o.z, eta_).reflectance, 0.1f, 0.9f);
@@ -158,8 +158,8 @@ class ThinClosure final : public BsdfClosure {
       t.value = diffuse_transmission_ * -i.z;
       if (!(specular_ > 0)) return t;
       const Vec3 h = normalize(o + Vec3{i.x, i.y, -i.z});
-      // Only light that also arrives from the far side of the microfacet. Not reciprocal; scenes are made with it. For
-      // importance the light's direction is o, and i the camera's.
+      // Only light that also arrives from the far side of the microfacet. Not reciprocal, but scenes rely on it. For
+      // importance, o is the light's direction and i the camera's.
       if ((mode == TransportMode::kRadiance ? dot(i, h) : dot({o.x, o.y, -o.z}, h)) >= 0) return t;
       const float visible = 0.25f * transmission_.eval(h) * transmission_.smith_g1_over_cos(o);
       t.pdf[1] = visible;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Value, density and delta samples of every model against Mitsuba 3, as recorded by
-// tests/references/make_bsdf_references.py (which describes the file).
+// Value, density and delta samples of every model against Mitsuba 3; tests/references/make_bsdf_references.py describes
+// the file.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -27,7 +27,7 @@ const Json& references() {
 
 Vec3 vec3(const Json& a) { return {a.at(0).get<float>(), a.at(1).get<float>(), a.at(2).get<float>()}; }
 
-/// "" or the largest disagreement of one case. `scale` multiplies our values, for the planted bug that must fail.
+/// "" or the largest disagreement in one case. `scale` multiplies our values, for the planted bug that must fail.
 std::string disagreement(const Json& entry, float scale = 1) {
   std::map<std::string, TexturePtr> textures;
   Json dictionary = entry.at("bsdf");
@@ -85,7 +85,7 @@ TEST(BsdfReferences, AgreeWithMitsuba) {
   for (const Json& entry : references().at("cases")) EXPECT_EQ(disagreement(entry), "");
 }
 
-// Planted bug: values 2 % too large are seen in every case that has values.
+// Planted bug: values 2 % too large are detected in every case that has values.
 TEST(BsdfReferences, SeeTwoPercent) {
   for (const Json& entry : references().at("cases")) EXPECT_NE(disagreement(entry, 1.02f), "") << entry.at("name");
 }
@@ -98,7 +98,7 @@ TEST(BsdfReferences, CoverEveryModel) {
       if (value.is_object()) visit(value);
   };
   for (const Json& entry : references().at("cases")) visit(entry.at("bsdf"));
-  // These have a file of their own, read by principled_test.cpp.
+  // These have their own file, read by principled_test.cpp.
   covered.insert({"principled", "principledthin"});
   for (const Plugin<Bsdf>& plugin : bsdf_plugins()) EXPECT_TRUE(covered.count(plugin.name)) << plugin.name;
 }

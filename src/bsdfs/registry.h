@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The reflectance models by the name scene files use. A new model: a word in registry.cpp, a file in CMake.
+// Reflectance models by the names used in scene files. To add one: a line in registry.cpp, a file in CMake.
 #pragma once
 
 #include <span>
@@ -9,7 +9,7 @@
 
 namespace covary {
 
-/// All of a kind, sorted by name.
+/// All plugins of a kind, sorted by name.
 std::span<const Plugin<Bsdf>> bsdf_plugins();
 
 }  // namespace covary

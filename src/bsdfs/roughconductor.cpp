@@ -4,7 +4,7 @@
 //
 // | name                 | type           | default | meaning                                                        |
 // |----------------------|----------------|---------|----------------------------------------------------------------|
-// | material             | string         | none    | a measured metal (conductor_presets.cpp), or none: no Fresnel  |
+// | material             | string         | none    | a measured metal (conductor_presets.cpp); none: no Fresnel     |
 // | eta, k               | colour/texture | 0, 1    | complex index of refraction eta + i k, instead of `material`   |
 // | specular_reflectance | colour/texture | 1       | factor on the reflection; not physical unless 1                |
 // | distribution, alpha, alpha_u, alpha_v, sample_visible   | | see roughness.h                                      |
@@ -69,7 +69,7 @@ class RoughConductor final : public Bsdf {
                                              scale_.eval(hit));
   }
   bool needs_derivatives() const override { return roughness_.anisotropic; }
-  /// Reflectance at normal incidence, the colour of the metal.
+  /// Reflectance at normal incidence.
   Spectrum albedo(const SurfaceHit& hit) const override {
     return clamp01(scale_.eval(hit) * fresnel_conductor(1, index_.eta.eval(hit), index_.k.eval(hit)));
   }

@@ -24,7 +24,7 @@ TEST(RoughConductor, IsReciprocal) {
   for (const Json& metal : metals()) EXPECT_GT(expect_adjoint(metal, {5, 45, 75}), 200);
 }
 
-// One scattering loses what leaves the microsurface downwards, and gains nothing.
+// Single scattering loses what leaves the microsurface downwards, and gains nothing.
 TEST(RoughConductor, WithoutMaterialLosesLittle) {
   for (const char* distribution : {"ggx", "beckmann"}) {
     const Json mirror{{"type", "roughconductor"}, {"distribution", distribution}, {"alpha", 0.1}};

@@ -11,8 +11,8 @@
 // | specular_transmittance | colour/texture | 1       | factor on the refraction; not physical unless 1   |
 // | distribution, alpha, alpha_u, alpha_v, sample_visible   | | see roughness.h                         |
 //
-// A normal m is drawn, then reflection is chosen with the Fresnel reflectance at m. That probability depends on m, not
-// on wo alone: so reflection and refraction are one lobe with one density over the whole sphere.
+// A normal m is sampled, then reflection is chosen with the Fresnel reflectance at m. That probability depends on m,
+// not on wo alone, so reflection and refraction are one lobe with one density over the whole sphere.
 #include "bsdfs/fresnel.h"
 #include "bsdfs/registry.h"
 #include "bsdfs/roughness.h"
@@ -32,8 +32,8 @@ class RoughDielectricClosure final : public BsdfClosure {
   BsdfValue eval(const Vec3& wo, const Vec3& wi) const override {
     if (wo.z == 0 || wi.z == 0) return {};
     const bool reflects = wo.z * wi.z > 0;
-    const float eta = wo.z > 0 ? eta_ : 1 / eta_;  // of the side of wi over that of wo, when it transmits
-    // Half vector, [Walter2007] Eqs. (13) and (16), turned to the side of the surface normal.
+    const float eta = wo.z > 0 ? eta_ : 1 / eta_;  // of the side of wi over that of wo, if it transmits
+    // Half vector, [Walter2007] Eqs. (13) and (16), flipped to the side of the surface normal.
     Vec3 m = normalize(reflects ? wo + wi : wo + wi * eta);
     if (m.z < 0) m = -m;
     const float om = dot(wo, m), im = dot(wi, m);
@@ -82,7 +82,7 @@ class RoughDielectricClosure final : public BsdfClosure {
 
  private:
   static Vec3 upwards(const Vec3& w) { return w.z < 0 ? -w : w; }
-  /// When all normals are sampled, a slightly rougher surface keeps the weights bounded ([Walter2007] Section 5.3).
+  /// When all normals are sampled, a slightly rougher surface keeps weights bounded ([Walter2007] Section 5.3).
   RoughSurface sampling_surface(const Vec3& wo) const {
     return surface_.sample_visible ? surface_ : surface_.scaled(1.2f - 0.2f * std::sqrt(std::abs(wo.z)));
   }

@@ -23,7 +23,7 @@ TEST(RoughDielectric, ImportanceIsTheAdjointOfRadiance) {
   for (const Json& glass : glasses()) EXPECT_GT(expect_adjoint(glass, {5, 60, 115, 160}), 250);
 }
 
-// No light is absorbed; one scattering loses a little.
+// No absorption; single scattering loses a little.
 TEST(RoughDielectric, LosesLittlePower) {
   for (const char* distribution : {"ggx", "beckmann"}) {
     const Json glass{{"type", "roughdielectric"}, {"distribution", distribution}, {"alpha", 0.1}};

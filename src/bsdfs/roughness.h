@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The roughness parameters that the rough models share, and the choice between sampling visible or all normals.
+// Roughness parameters of the rough models, and the choice between sampling visible or all normals.
 //
 // | name             | type           | default  | meaning                                                            |
 // |------------------|----------------|----------|--------------------------------------------------------------------|
@@ -15,12 +15,12 @@
 
 namespace covary {
 
-/// A microfacet distribution with the way its normals are sampled.
+/// A microfacet distribution and how its normals are sampled.
 struct RoughSurface {
   Microfacet normals;
   bool sample_visible;
 
-  /// A normal for w (`w.z` > 0), continuous in u, with its density per unit solid angle.
+  /// Samples a normal for w (`w.z` > 0), continuous in u, with its density per unit solid angle.
   Microfacet::Sample sample(const Vec3& w, Vec2 u) const {
     return sample_visible ? normals.sample(w, u) : sample_all(u);
   }
@@ -28,8 +28,8 @@ struct RoughSurface {
   float pdf(const Vec3& w, const Vec3& m) const {
     return sample_visible ? normals.pdf(w, m) : normals.eval(m) * std::max(m.z, 0.0f);
   }
-  /// Value of f_cos / (F pdf(m)) for the normal m that sample() drew: all but the Fresnel term and the Jacobian, which
-  /// is common to value and density.
+  /// f_cos / (F pdf(m)) for the normal m that sample() drew: everything but the Fresnel term and the Jacobian, which is
+  /// common to value and density.
   float weight(const Vec3& wo, const Vec3& wi, const Vec3& m) const {
     if (sample_visible) return normals.smith_g1(wi, m);
     return normals.smith_g(wo, wi, m) * std::abs(dot(wo, m) / (wo.z * m.z));

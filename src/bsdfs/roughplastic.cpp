@@ -4,7 +4,7 @@
 // | name                 | type           | default       | meaning                                                |
 // |----------------------|----------------|---------------|--------------------------------------------------------|
 // | diffuse_reflectance  | colour/texture | 0.5           | reflectance of the base                                |
-// | nonlinear            | bool           | false         | colour shift by repeated scattering inside the coating |
+// | nonlinear            | bool           | false         | colour shift by multiple scattering inside the coating |
 // | int_ior              | number/string  | polypropylene | index of refraction of the coating                     |
 // | ext_ior              | number/string  | air           | index of refraction outside; must differ from int_ior  |
 // | specular_reflectance | colour/texture | 1             | factor on the coating's reflection                     |
@@ -12,10 +12,10 @@
 // | alpha                | number         | 0.1           | roughness                                              |
 // | sample_visible       | bool           | true          | see roughness.h                                        |
 //
-// As plastic.cpp, with the transmittance T of the rough interface in place of 1 - F:
+// Like plastic.cpp, with the transmittance T of the rough interface in place of 1 - F:
 //     f_diffuse = T(wi) T(wo) rho / (pi eta^2 (1 - rho Ri)).
-// T(cos) is tabulated when the model is made, by quadrature over the visible normals; Ri is the mean reflectance of the
-// interface from inside, by the same quadrature. Models with the same interface share its table.
+// T(cos) is tabulated at construction by quadrature over the visible normals; Ri is the mean internal reflectance, by
+// the same quadrature. Models with the same interface share a table.
 #include <array>
 #include <map>
 #include <memory>
@@ -30,12 +30,12 @@
 namespace covary {
 namespace {
 
-/// Points in (0, 1) and weights (sum 1) of Gauss-Legendre quadrature.
+/// Nodes in (0, 1) and weights (sum 1) of Gauss-Legendre quadrature.
 struct GaussLegendre {
   std::vector<double> x, weight;
   explicit GaussLegendre(int n) : x(n), weight(n) {
     for (int i = 0; i < n; ++i) {
-      // Newton's method for the roots of the Legendre polynomial P_n, from the classical asymptotic estimate.
+      // Newton's method for the roots of the Legendre polynomial P_n, starting from the classical asymptotic estimate.
       double z = std::cos(M_PI * (i + 0.75) / (n + 0.5)), derivative = 1;
       for (int step = 0; step < 8; ++step) {
         double p = 1, previous = 0;
@@ -56,14 +56,14 @@ struct GaussLegendre {
 class RoughTransmittance {
  public:
   RoughTransmittance(const Microfacet& normals, float eta) {
-    // The error of the mean reflectance, which has a kink at total internal reflection, is then below 1e-4.
+    // Keeps the error of the mean reflectance, which has a kink at total internal reflection, below 1e-4.
     const GaussLegendre rule(normals.type() == MicrofacetType::kGgx ? 48 : 32);
     double internal = 0;
     for (int i = 0; i < kSize; ++i) {
       const float mu = std::max(1e-6f, static_cast<float>(i) / (kSize - 1));
       const Vec3 w{std::sqrt(1 - mu * mu), 0, mu};
-      // Fraction of the power from w that one scattering transmits (from outside) or reflects (from inside): the mean
-      // over the visible normals of (1 - F) G1(w'), or F G1(w').
+      // Fraction of the power from w that single scattering transmits (from outside) or reflects (from inside): the
+      // mean over visible normals of (1 - F) G1(w') or F G1(w').
       double transmitted = 0, reflected = 0;
       for (size_t j = 0; j < rule.x.size(); ++j)
         for (size_t k = 0; k < rule.x.size(); ++k) {
@@ -78,7 +78,8 @@ class RoughTransmittance {
       external_[i] = static_cast<float>(transmitted);
       internal += reflected * mu;
     }
-    // The plain mean over the entries, 1 to 2 % below the integral, is what Mitsuba scenes are tuned with.
+    // The plain mean over the entries is 1 to 2 % below the integral, but it is what Mitsuba does and scenes are tuned
+    // for.
     internal_reflectance_ = static_cast<float>(2 * internal / kSize);
   }
   /// `cos_theta` in [0, 1].
@@ -96,7 +97,7 @@ class RoughTransmittance {
   float internal_reflectance_;
 };
 
-/// That of an interface; the same object while one lives. Thread-safe.
+/// The table of an interface, shared while any user is alive. Thread-safe.
 std::shared_ptr<const RoughTransmittance> shared_transmittance(const Microfacet& normals, float eta) {
   static std::mutex mutex;
   static std::map<std::tuple<MicrofacetType, float, float>, std::weak_ptr<const RoughTransmittance>> known;
@@ -119,7 +120,7 @@ class RoughPlasticClosure final : public CoatedClosure<RoughPlasticClosure> {
         base_(base),
         specular_(specular) {}
 
-  /// By the coating's directional reflectance and the mean colours.
+  /// From the coating's directional reflectance and the mean colours.
   float specular_pmf(float cos_o) const { return specular_pmf_of(transmittance_(cos_o)); }
   BsdfValue eval(const Vec3& wo, const Vec3& wi) const override {
     if (!(wo.z > 0 && wi.z > 0)) return {};

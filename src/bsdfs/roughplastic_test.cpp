@@ -26,7 +26,7 @@ TEST(RoughPlastic, IsReciprocal) {
   for (const Json& plastic : plastics()) EXPECT_GT(expect_adjoint(plastic, {5, 45, 75}), 200);
 }
 
-// As plastic.cpp, less what one scattering at the rough interface loses.
+// As for plastic.cpp, minus what single scattering at the rough interface loses.
 TEST(RoughPlastic, WhiteBaseReflectsNearlyEverything) {
   for (const char* distribution : {"ggx", "beckmann"}) {
     const Json white{
@@ -39,7 +39,7 @@ TEST(RoughPlastic, BaseApproachesThatOfSmoothPlastic) {
   const Vec3 wo = direction(30, 0), wi = direction(55, 1.5f);  // far from the mirror direction
   const float smooth = Bound({{"type", "plastic"}}, wo)->eval(wo, wi).value.g;
   const float rough = Bound({{"type", "roughplastic"}, {"alpha", 0.005}}, wo)->eval(wo, wi).value.g;
-  // The mean over the table's entries (see roughplastic.cpp) is 1.7 % below the integral that plastic takes for Ri.
+  // The mean over the table's entries (see roughplastic.cpp) is 1.7 % below the integral that plastic uses for Ri.
   EXPECT_NEAR(rough / smooth, (1 - 0.596f) / (1 - 0.983f * 0.596f), 0.01f);
 }
 
@@ -55,7 +55,7 @@ TEST(RoughPlastic, EachInterfaceHasItsOwnTransmittance) {
         ->eval(w, w)
         .value.g;
   };
-  const Bound first({{"type", "roughplastic"}, {"alpha", 0.3}}, w);  // its table lives on
+  const Bound first({{"type", "roughplastic"}, {"alpha", 0.3}}, w);  // keeps its table alive
   const float same = value("beckmann", 0.3, 1.49);
   EXPECT_EQ(value("beckmann", 0.3, 1.49), same);
   for (const float other : {value("ggx", 0.3, 1.49), value("beckmann", 0.5, 1.49), value("beckmann", 0.3, 1.6)})

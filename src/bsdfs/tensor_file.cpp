@@ -21,12 +21,12 @@ static_assert(std::endian::native == std::endian::little, "files are read as the
 
 constexpr char kMagic[12] = "tensor_file";
 constexpr int kByte = 1, kFloat = 10;
-/// Bytes of a value, by type: integers of 8 to 64 bits without and with sign, floats of 16, 32, 64 bits.
+/// Bytes per value by type: unsigned and signed integers of 8 to 64 bits, floats of 16, 32, 64 bits.
 constexpr size_t kSizes[] = {0, 1, 1, 2, 2, 4, 4, 8, 8, 2, 4, 8};
 
 Error refusal(const std::string& path, const std::string& what) { return {ErrorCode::kInput, path + ": " + what}; }
 
-/// Reads the list of fields; an end of the file in the middle of it is an error.
+/// Reads the list of fields; a truncated list is an error.
 class HeaderReader {
  public:
   HeaderReader(std::ifstream& stream, const std::string& path) : stream_(stream), path_(path) {}
@@ -77,7 +77,7 @@ TensorFile::TensorFile(const std::string& path) : path_(path) {
     field.place = header.number<uint64_t>();
     if (field.type == 0 || field.type >= static_cast<int>(std::size(kSizes)))
       throw refusal(path, fmt::format("has values of unknown type {} in field {}", field.type, i + 1));
-    const uint64_t most = n_bytes_ / kSizes[field.type];  // values that the file has room for
+    const uint64_t most = n_bytes_ / kSizes[field.type];  // as many values as fit in the file
     bool fits = field.place <= n_bytes_;
     field.count = 1;
     for (int d = 0; d < n_dimensions; ++d) {

@@ -42,7 +42,7 @@ TEST(TensorFile, ReadsFields) {
   EXPECT_EQ(file.n_bytes(), tensor_text(kFields).size());
 }
 
-TEST(TensorFile, ReadsWhatMitsubaReads) {  // written by Python, values aligned to 8 bytes
+TEST(TensorFile, ReadsWhatMitsubaReads) {  // written in Python, values aligned to 8 bytes
   const TensorFile file(COVARY_SOURCE_DIR "/tests/references/measured_isotropic.bsdf");
   EXPECT_EQ(file.shape("rgb"), (std::vector<uint64_t>{1, 6, 3, 8, 8}));
   EXPECT_FLOAT_EQ(file.floats("theta_i")[2], 40 * static_cast<float>(M_PI) / 180);
@@ -68,14 +68,14 @@ TEST(TensorFile, DamagedFilesAreRefused) {
   other[12] = 2;
   EXPECT_EQ(refused(other), ": is a tensor file of version 2.0; expected 1.0");
   other = whole;
-  other[23] = 12;  // the type of the first field: after 18 bytes, its name of 2 + 1 and 2
+  other[23] = 12;  // type of the first field, after 18 bytes, its name (2 + 1) and 2 more
   EXPECT_EQ(refused(other), ": has values of unknown type 12 in field 1");
   EXPECT_EQ(refused(tensor_text({kFields[0], kFields[0]})), ": has two fields of one name, the second is field 2");
-  // Every shorter file is refused, and none is read beyond its end.
+  // Every truncated file is rejected without reading past its end.
   for (size_t length = 0; length < whole.size(); ++length) EXPECT_NE(refused(whole.substr(0, length)), "");
 }
 
-/// Lengths whose product overflows, or is more than there is, are found before anything is allocated.
+/// Sizes that overflow, or exceed the file, are detected before anything is allocated.
 TEST(TensorFile, HugeFieldsAreRefused) {
   constexpr uint64_t kHuge = uint64_t{1} << 33;
   for (const std::vector<uint64_t>& shape : {std::vector<uint64_t>{kHuge, kHuge, 2}, {kHuge}, {1000}}) {
@@ -88,7 +88,7 @@ TEST(TensorFile, HugeFieldsAreRefused) {
   empty[0].shape = {0, kHuge, kHuge};
   EXPECT_TRUE(TensorFile(write(tensor_text(empty))).floats("a").empty());
   std::string far = tensor_text(kFields);
-  far[24 + 6] = 1;  // the place of the first field's values
+  far[24 + 6] = 1;  // offset of the first field's values
   EXPECT_TRUE(contains(refused(far), "values at byte 281474976710"));
 }
 

@@ -3,10 +3,10 @@
 //
 // | name               | type   | default | meaning                                                              |
 // |--------------------|--------|---------|----------------------------------------------------------------------|
-// | (nested)           | bsdf   |         | one model for both sides, or two: first the side of the normal       |
+// | (nested)           | bsdf   |         | one model for both sides, or two: front (the normal's side), back    |
 // | allow_transmission | bool   | false   | accept nested models that transmit light                             |
 //
-// The model on the back sees directions mirrored about the surface.
+// The model on the back sees directions mirrored in the surface.
 #include <optional>
 
 #include "bsdfs/inputs.h"
@@ -48,12 +48,12 @@ class MirroredClosure final : public BsdfClosure {
   const BsdfClosure* nested_;
 };
 
-/// Two models of which at least one transmits light. The camera's side chooses the model: for radiance that of wo, for
-/// importance that of wi, although directions are then drawn from the model on the side of wo. What the light's model
-/// draws and the camera's does not know (refraction at two different interfaces) is found from the camera only.
+/// Two models, at least one of which transmits light. The camera's side chooses the model: for radiance that of wo, for
+/// importance that of wi, although directions are then sampled from the model on the side of wo. What the light's model
+/// samples and the camera's cannot (refraction at two different interfaces) is found from the camera only.
 class TransmittingClosure final : public BsdfClosure {
  public:
-  /// `same`: one model on both sides, so that light passes straight through with the same probability from both.
+  /// `same`: one model on both sides, so that null transmission has the same probability from both.
   TransmittingClosure(const BsdfClosure* front, const BsdfClosure* back, bool same, TransportMode mode)
       : front_(front), back_(back), same_(same), importance_(mode == TransportMode::kImportance) {}
 
@@ -70,7 +70,7 @@ class TransmittingClosure final : public BsdfClosure {
     s.weight = side(s.wi).eval(wo, s.wi).value / s.pdf;
     return s;
   }
-  /// For importance only what is the same from both sides.
+  /// For importance, only what is the same from both sides.
   NullPassage null_passage(const Vec3& wo) const override {
     return same_ || !importance_ ? side(wo).null_passage(wo) : NullPassage{};
   }
@@ -120,7 +120,7 @@ class TwoSided final : public Bsdf, public MaybeLambertian {
   Spectrum albedo(const SurfaceHit& hit) const override { return front_->albedo(hit); }
 
  private:
-  /// Apart from bind(), which is short and called for every hit.
+  /// Kept out of bind(), which is short and called for every hit.
   [[gnu::noinline]] const BsdfClosure* bind_both(const SurfaceHit& hit, TransportMode mode, Arena& arena) const {
     const BsdfClosure* front = front_->bind(hit, true, mode, arena);
     const BsdfClosure* back = arena.make<MirroredClosure>(back_->bind(hit, true, mode, arena));

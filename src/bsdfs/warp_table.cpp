@@ -10,7 +10,7 @@
 namespace covary {
 namespace {
 
-/// The first node of the interval that holds `value`, and the weight of the second.
+/// The first node of the interval containing `value`, and the interpolation weight of the second.
 struct NodePlace {
   uint32_t node;
   float weight;
@@ -23,17 +23,17 @@ NodePlace place_between(const std::vector<float>& nodes, float value) {
   return {node, std::clamp((value - nodes[node]) / (nodes[node + 1] - nodes[node]), 0.0f, 1.0f)};
 }
 
-/// Where the integral of the function that goes from f0 to f1 over [0, 1] is `area`.
+/// The t at which the integral from 0 of the linear function from f0 (t = 0) to f1 (t = 1) reaches `area`.
 float solve_segment(float area, float f0, float f1) {
-  // f0 t + (f1 - f0) t² / 2 = area, in the form that keeps its digits when f0 and f1 are nearly equal.
+  // f0 t + (f1 - f0) t² / 2 = area, in a form that is stable when f0 and f1 are nearly equal.
   const float root = f0 + safe_sqrt(f0 * f0 + 2 * area * (f1 - f0));
   return root > 0 ? std::clamp(2 * area / root, 0.0f, 1.0f) : 0;
 }
 
-/// Its integral from 0 to t.
+/// Integral of that function from 0 to t.
 float integrate_segment(float t, float f0, float f1) { return t * (f0 + 0.5f * t * (f1 - f0)); }
 
-/// The last of the cells 0 … n - 1 whose integral before it, `before(cell)`, is at most `target`.
+/// The last of cells 0 … n - 1 for which `before(cell)`, the integral up to that cell, is at most `target`.
 template <typename F>
 int find_cell(int n, float target, F before) {
   int low = 0, high = n;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Functions on the unit square, bilinear between the values of a grid, that depend on two parameters: between the
-// parameters' nodes they are linear. What a measured material is made of [DupuyJakob2018].
+// Bilinear functions on the unit square that depend on two parameters and are interpolated linearly between the
+// parameters' nodes: the tables of measured materials [DupuyJakob2018].
 #pragma once
 
 #include <array>
@@ -13,18 +13,18 @@
 
 namespace covary {
 
-/// The grids that take part at one place between the nodes of the parameters, with weights that sum to 1.
+/// Slices to interpolate for given parameters, with weights that sum to 1.
 struct SliceMix {
   int n = 0;
   std::array<uint32_t, 4> slice{};
   std::array<float, 4> weight{};
 };
 
-/// Nodes of the parameters, each strictly increasing, at least one. Grid i · |b| + j is that of node (i, j).
+/// Nodes of the two parameters, strictly increasing, at least one each. Slice i · |b| + j belongs to node (i, j).
 struct ParameterNodes {
   std::vector<float> a, b;
   uint32_t n_slices() const { return static_cast<uint32_t>(a.size() * b.size()); }
-  /// Beyond the first and last nodes the function is that of these.
+  /// Parameters are clamped to the range of the nodes.
   SliceMix at(float a_value, float b_value) const;
 };
 
@@ -34,7 +34,7 @@ struct GridSize {
   size_t n() const { return static_cast<size_t>(width) * height; }
 };
 
-/// A place in a grid: the cell's first corner and the position in the cell.
+/// A position in a grid: the cell's first corner and the offset in the cell.
 struct GridPlace {
   size_t index;
   int x, y;
@@ -47,9 +47,9 @@ template <typename Value>
 class BilinearTable {
  public:
   BilinearTable() = default;
-  /// `values`: slice by slice, row by row.
+  /// `values`: slice by slice, each row-major.
   BilinearTable(std::vector<Value> values, GridSize size) : size_(size), values_(std::move(values)) {}
-  /// Of one slice at uv, limited to [0, 1]².
+  /// Value of one slice at uv, clamped to [0, 1]².
   Value eval(uint32_t slice, Vec2 uv) const {
     const GridPlace p(size_, uv);
     return at(slice, p);
@@ -71,22 +71,22 @@ class BilinearTable {
   std::vector<Value> values_;
 };
 
-/// Densities on the unit square, drawn from by inversion: first the row, by the marginal distribution, then the column.
-/// The map is continuous, and has an inverse.
+/// Densities on the unit square, sampled by inversion: the row by the marginal distribution, then the column. The map
+/// is continuous and invertible.
 class WarpTable {
  public:
   WarpTable() = default;
-  /// `values`: slice by slice, row by row, not negative; each slice is scaled to integrate to 1. Throws Error(kInput)
-  /// "NAME …" for a negative value or a slice that is zero everywhere.
+  /// `values`: slice by slice, each row-major, not negative; each slice is normalised to integrate to 1. Throws
+  /// Error(kInput) "NAME …" for a negative value or a slice that is zero everywhere.
   WarpTable(std::vector<float> values, GridSize size, const std::string& name);
 
   struct Result {
     Vec2 uv;
-    float pdf;  ///< per unit area of the square where the density lies
+    float pdf;  ///< per unit area of the sampled square
   };
   /// `u` in [0, 1)².
   Result sample(const SliceMix& mix, Vec2 u) const;
-  /// The u that sample() takes to `uv`, and the density there.
+  /// Inverse of sample(): the u that maps to `uv`, and the density there.
   Result invert(const SliceMix& mix, Vec2 uv) const;
   float pdf(const SliceMix& mix, Vec2 uv) const;
 
@@ -98,19 +98,19 @@ class WarpTable {
     return sum;
   }
   float value(const SliceMix& mix, size_t index) const { return mixed(values_, size_.n(), mix, index); }
-  /// Integral over the row up to column x.
+  /// Integral over row y up to column x.
   float in_row(const SliceMix& mix, int y, int x) const {
     return mixed(row_sums_, size_.n(), mix, static_cast<size_t>(y) * size_.width + x);
   }
-  /// Integral over all rows up to row y.
+  /// Integral from the first row to row y.
   float rows(const SliceMix& mix, int y) const {
     return mixed(sums_, static_cast<size_t>(size_.height), mix, static_cast<size_t>(y));
   }
 
   GridSize size_;
   std::vector<float> values_;
-  std::vector<float> row_sums_;  // of each row, the integral from 0 to each column
-  std::vector<float> sums_;      // the integral from the first row to each row
+  std::vector<float> row_sums_;  // CDF of each row at its columns, not normalised
+  std::vector<float> sums_;      // CDF over rows, not normalised
 };
 
 }  // namespace covary

@@ -15,7 +15,7 @@ namespace {
 
 using test_support::message_of;
 
-/// Two nodes of the first parameter, three of the second; values with empty rows, columns and corners.
+/// Two nodes of the first parameter, three of the second; values include empty rows, columns and corners.
 const ParameterNodes kNodes{{-1, 1}, {0, 1, 3}};
 constexpr GridSize kSize{4, 3};
 
@@ -58,7 +58,7 @@ TEST(BilinearTable, InterpolatesAndLimits) {
   EXPECT_FLOAT_EQ(t.eval(ParameterNodes{{0}, {0, 1}}.at(0, 0.5f), {0.5f, 0.5f}), 4.5f);
 }
 
-/// Midpoint sums over 400 x 400 cells: of a function that is bilinear within cells of a third and a half, 2e-5 off.
+/// Midpoint rule over 400 x 400 cells; for a function bilinear on a grid of thirds and halves the error is 2e-5.
 TEST(WarpTable, DensityIntegratesToOne) {
   for (const SliceMix& mix : kMixes) {
     double sum = 0;
@@ -84,8 +84,8 @@ TEST(WarpTable, InverseUndoesSampling) {
     }
 }
 
-/// The determinant of the map's derivative is one over the density: no samples, so nothing statistical. Differences of
-/// 1e-3 of floats: 1 % off, and more at the edges of cells, which a second look within 2e-3 shows, and leaves out.
+/// The Jacobian determinant of the map is one over the density: deterministic. Finite differences of 1e-3 in floats are
+/// 1 % off, and more at cell edges, which a second difference of 2e-3 detects and excludes.
 TEST(WarpTable, SamplesFollowTheDensity) {
   int n = 0;
   for (const SliceMix& mix : kMixes)
