@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `bitmap`: a texture from an image file. Values agree with Mitsuba 3's plugin of this name.
+// `bitmap`: a texture from an image file. Values agree with Mitsuba 3's plugin of the same name.
 //
 // | parameter   | type      | default  | meaning                                                                      |
 // |-------------|-----------|----------|------------------------------------------------------------------------------|
@@ -11,10 +11,10 @@
 // | format      | string    | auto     | accepted for compatibility; bytes stay bytes, other files become floats      |
 // | accel       | boolean   | true     | accepted for compatibility; no effect                                        |
 //
-// A one-channel lookup gives the grey value, or the luminance of a colour (also of a raw one). Different from Mitsuba
-// 3.9: the gradient follows the chain rule for every to_uv (there, only for square images or diagonal to_uv), 16-bit
-// files keep all their digits, and lights sample positions uniformly where to_uv does not keep the unit square (an
-// error there).
+// A one-channel lookup gives the grey value, or the luminance of a colour (of a raw one, too). Differences from Mitsuba
+// 3.9: the gradient follows the chain rule for any to_uv (there, only for square images or diagonal to_uv); 16-bit
+// files keep full precision; lights sample positions uniformly if to_uv does not preserve the unit square (an error
+// there).
 #include "textures/bitmap.h"
 
 #include <array>
@@ -47,7 +47,7 @@ const DecodeTable& decode_table(bool srgb) {
   return kTables[srgb];
 }
 
-/// The values of an image of interleaved channels in the order of `layout`.
+/// The values of an interleaved image, reordered to `layout`.
 template <typename T>
 LargeVector<T> in_blocks(const std::vector<T>& values, const TexelImage& image, const BlockLayout& layout) {
   const int channels = image.channels;
@@ -59,8 +59,8 @@ LargeVector<T> in_blocks(const std::vector<T>& values, const TexelImage& image, 
   return result;
 }
 
-// Four ways to keep texels. Each has Value (what a lookup gives), value(index) and prefetch(index), with the index of
-// the layout.
+// Four storage formats of texels. Each has Value (the result of a lookup), value(index) and prefetch(index), with
+// indices of the layout.
 
 class FloatGrey {
  public:
@@ -120,14 +120,14 @@ class ByteRgb {
 float grey(float value) { return value; }
 float grey(const Spectrum& value) { return luminance(value); }
 
-/// Where a coordinate falls along one axis: between texels `i0` and `i1`, at the fraction `f` from the first.
+/// Position of a coordinate along one axis: between texels `i0` and `i1`, at fraction `f` from the first.
 struct AxisCell {
   int i0, i1;
   float f;
-  float direction;  // -1 where mirroring reverses the axis
+  float direction;  // -1 if mirroring reverses the axis
 };
 
-/// `n` texels along the axis; any `u`, also one that is not finite (which gives some texel).
+/// `n` texels along the axis; any `u`, even one that is not finite (which gives some texel).
 inline AxisCell find_cell(float u, int n, WrapMode wrap) {
   float direction = 1;
   switch (wrap) {
@@ -194,7 +194,7 @@ class Bitmap final : public Texture {
   PositionSample sample_position(Vec2 u) const override {
     const PiecewiseConstant2D* texel_choice = distribution();
     if (!texel_choice) return {u, 1};
-    // A texel in proportion to its luminance, then the filter around its centre: together the interpolated luminance.
+    // Samples a texel by its luminance, then the tent around its centre; the density is the interpolated luminance.
     Vec2 st = texel_choice->sample(u).uv;
     if (settings_.filter == FilterType::kBilinear) {
       st.x = within_filter(st.x, width_);
@@ -222,8 +222,8 @@ class Bitmap final : public Texture {
   static int nearest(const AxisCell& cell) { return cell.f < 0.5f ? cell.i0 : cell.i1; }
   float grey_at(int x, int y) const { return grey(texels_.value(layout_.index(x, y))); }
 
-  /// `s` uniform within its texel becomes tent-distributed around the texel's centre. What falls outside [0, 1] comes
-  /// back in as the wrap mode says; mirror and clamp extend the border texel, so both fold back.
+  /// Maps `s`, uniform within its texel, to a tent around the texel's centre. Positions outside [0, 1] are mapped back
+  /// according to the wrap mode; mirror and clamp repeat the border texel, so both fold back.
   float within_filter(float s, int n) const {
     const float x = s * static_cast<float>(n), texel = std::min(std::floor(x), static_cast<float>(n - 1));
     const float t = (texel + 0.5f + warp::interval_to_tent(clamp01(x - texel), 1)) / static_cast<float>(n);
@@ -241,7 +241,7 @@ class Bitmap final : public Texture {
     return lerp(y.f, lerp(x.f, at(x.i0, y.i0), at(x.i1, y.i0)), lerp(x.f, at(x.i0, y.i1), at(x.i1, y.i1)));
   }
 
-  /// Made when first asked for, because few textures emit; null: positions are uniform.
+  /// Built on first use, because few textures emit. Null: positions are sampled uniformly.
   const PiecewiseConstant2D* distribution() const {
     if (!samples_luminance_) return nullptr;
     std::call_once(distribution_once_, [this] {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Textures made of an image. Texel (x, y), y counted from the top row of the picture, has its centre at
-// ((x + 0.5) / width, (y + 0.5) / height) in texture coordinates: v = 0 is the top row.
+// Image textures. Texel (x, y), y counted from the top row of the image, is centred at ((x + 0.5) / width, (y + 0.5) /
+// height) in texture coordinates: v = 0 is the top edge.
 #pragma once
 
 #include "scene/texture.h"
@@ -19,8 +19,8 @@ struct BitmapSettings {
   UvTransform to_uv;  ///< from surface parameters to texture coordinates
 };
 
-/// Texture that looks values up in `image`, which has at least one pixel. Positions are sampled exactly in proportion
-/// to the interpolated luminance where to_uv maps the unit square onto itself, uniformly otherwise.
+/// Texture that interpolates `image`, which has at least one pixel. Positions are sampled exactly in proportion to the
+/// interpolated luminance if to_uv maps the unit square to itself, uniformly otherwise.
 std::shared_ptr<Texture> make_bitmap_texture(TexelImage image, const BitmapSettings& settings);
 
 }  // namespace covary

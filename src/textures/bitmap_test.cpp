@@ -39,8 +39,8 @@ Transform to_uv(const nlohmann::json& rows) {
 
 Vec2 point(const nlohmann::json& p) { return {p[0].get<float>(), p[1].get<float>()}; }
 
-/// Compares all lookups of `texture` with those of `expected`. Single precision in (u, v) up to 4 and texels with
-/// values up to `scale` apart leave errors of about 1e-6 * scale * resolution.
+/// Compares all lookups of `texture` with `expected`. Single precision in (u, v) up to 4, and texels that differ by up
+/// to `scale`, leave errors of about 1e-6 * scale * resolution.
 void expect_lookups(const Texture& texture, const nlohmann::json& points, const nlohmann::json& expected,
                     const std::string& name) {
   double scale = 1;
@@ -87,7 +87,7 @@ TEST(Bitmap, AgreesWithMitsubaInAllFileFormatsFiltersAndWrapModes) {
   EXPECT_GE(compared, 100);
 }
 
-/// 5 x 3 texels of values 0 to 1, some of them black, so that the density has zeros.
+/// 5 x 3 texels with values 0 to 1, some black, so that the density has zeros.
 TexelImage sample_image(int channels, bool bytes) {
   TexelImage image;
   image.width = 5, image.height = 3, image.channels = channels, image.srgb = bytes;
@@ -123,7 +123,7 @@ class BitmapSampling : public testing::TestWithParam<SamplingCase> {
   }
 };
 
-// N = 400 000, alpha = 5e-7: sees 2.3 % rms error of the density with power 0.99 (statistics/chi2.h).
+// N = 400 000, alpha = 5e-7: detects an rms error of 2.3 % of the density with power 0.99 (statistics/chi2.h).
 TEST_P(BitmapSampling, PositionsFollowTheirDensity) {
   const auto t = texture();
   const auto sample = [&](const PathRandom& random) -> std::optional<Vec2> {
@@ -148,11 +148,11 @@ TEST_P(BitmapSampling, DensityIsProportionalToTheLuminance) {
     ASSERT_GT(position.pdf, 0);
     ASSERT_NEAR(t->pdf_position(position.uv), position.pdf, 2e-4 * position.pdf + 1e-4);
     const double here = t->eval_1(hit_at(position.uv)) / position.pdf;
-    if (position.pdf < 0.05) continue;  // the quotient of two small numbers has few digits
+    if (position.pdf < 0.05) continue;  // the ratio of two small numbers is imprecise
     if (ratio == 0) ratio = here;
     ASSERT_NEAR(here, ratio, 1e-3 * ratio);
   }
-  // The ratio is the mean over the unit square: that of the texels, because every texel has the same share of it.
+  // The ratio is the mean over the unit square, which is the mean of the texels, since each covers the same area.
   EXPECT_NEAR(ratio, t->mean(), 1e-3 * ratio);
 }
 

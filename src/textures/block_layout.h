@@ -5,8 +5,8 @@
 
 namespace covary {
 
-/// Order in memory of the texels of an image: blocks of 4 x 4, row by row, in each of them again row by row. The four
-/// texels that an interpolation reads then lie in one or two cache lines and pages, not in rows far apart.
+/// Memory order of texels: 4 x 4 blocks, row-major, texels within a block row-major. The four texels of a bilinear
+/// lookup then lie in one or two cache lines and pages rather than in distant rows.
 class BlockLayout {
  public:
   static constexpr int kBlock = 4;
@@ -18,11 +18,11 @@ class BlockLayout {
 
   int blocks_x() const { return blocks_x_; }
   int blocks_y() const { return blocks_y_; }
-  /// Texels to make room for: the image's, and those that complete blocks at its right and lower edge.
+  /// Number of texels to allocate: the image's, and the padding that completes blocks at its right and bottom edges.
   size_t size() const { return blocks_y_ * row_of_blocks_; }
 
   size_t index(int x, int y) const { return row_offset(y) + column_offset(x); }
-  // The two parts of the index. Unsigned numbers: divisions become shifts.
+  // The two terms of the index. Unsigned arithmetic turns divisions into shifts.
   size_t row_offset(int y) const {
     const auto row = static_cast<size_t>(y);
     return row / kBlock * row_of_blocks_ + row % kBlock * kBlock;

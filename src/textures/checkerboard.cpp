@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `checkerboard`: two by two squares per unit of (u, v), after Mitsuba 3's plugin of this name.
+// `checkerboard`: two by two squares per unit of (u, v), after Mitsuba 3's plugin of the same name.
 //
 // | parameter | type             | default  | meaning                                        |
 // |-----------|------------------|----------|------------------------------------------------|
@@ -7,8 +7,8 @@
 // | color1    | colour, texture  | 0.2      | the other squares                              |
 // | to_uv     | transform        | identity | from surface parameters to texture coordinates |
 //
-// Different from Mitsuba 3.9: one-channel lookups (opacity, roughness, …) see the same squares as colour lookups;
-// there, color0 and color1 change places.
+// Difference from Mitsuba 3.9: one-channel lookups (opacity, roughness, …) use the same squares as colour lookups;
+// there, color0 and color1 are swapped.
 #include "textures/registry.h"
 #include "textures/uv_transform.h"
 
@@ -22,7 +22,7 @@ class Checkerboard final : public Texture {
 
   Spectrum eval(const SurfaceHit& hit) const override { return at(hit).eval(hit); }
   float eval_1(const SurfaceHit& hit) const override { return at(hit).eval_1(hit); }
-  /// Of the square's own texture: the edges between squares have no derivative.
+  /// Gradient of the square's own texture; edges between squares contribute none.
   Vec2 grad_1(const SurfaceHit& hit) const override { return at(hit).grad_1(hit); }
   float mean() const override { return 0.5f * (color0_->mean() + color1_->mean()); }
 

@@ -22,7 +22,7 @@
 namespace covary {
 namespace {
 
-/// Which channels of the file hold grey or red, green, blue.
+/// Indices of the channels that hold grey or red, green, blue.
 std::vector<int> choose_channels(const ImageHeader& header, const std::string& path) {
   const std::vector<std::string>& names = header.channels;
   const auto find = [&](const char* name) {
@@ -38,7 +38,7 @@ std::vector<int> choose_channels(const ImageHeader& header, const std::string& p
                                              fmt::join(names, ", ")));
 }
 
-/// Of pixels with the channels from `first` on, those in `keep`.
+/// Selects channels `keep` from pixels whose channels start at `first`.
 template <typename T>
 std::vector<T> keep_channels(std::vector<T> all, size_t n_pixels, int first, const std::vector<int>& keep) {
   const size_t n_read = all.size() / n_pixels;
@@ -49,7 +49,7 @@ std::vector<T> keep_channels(std::vector<T> all, size_t n_pixels, int first, con
   return kept;
 }
 
-/// Throws where a value is not finite.
+/// Throws if a value is not finite.
 void check_finite(const TexelImage& image, const std::string& path) {
   const auto it = std::find_if(image.floats.begin(), image.floats.end(), [](float v) { return !std::isfinite(v); });
   if (it == image.floats.end()) return;
@@ -58,7 +58,7 @@ void check_finite(const TexelImage& image, const std::string& path) {
                                              pixel % image.width, pixel / image.width));
 }
 
-/// Throws where an EXR file of covary is not as covary wrote it.
+/// Throws if an EXR file of covary does not match its checksums.
 void check_checksums(const TexelImage& image, const ImageHeader& header, const std::vector<int>& channels,
                      const std::string& path) {
   if (header.format != "openexr" || header.type != "float") return;
@@ -66,7 +66,7 @@ void check_checksums(const TexelImage& image, const ImageHeader& header, const s
   if (!stored || stored->channels.size() != header.channels.size()) return;
   for (size_t c = 0; c < channels.size(); ++c) {
     const std::string& name = header.channels[channels[c]];
-    // The file's order is that of names; OpenImageIO puts colours first.
+    // Channels are sorted by name in the file; OpenImageIO puts colours first.
     const auto place = std::count_if(header.channels.begin(), header.channels.end(),
                                      [&](const std::string& other) { return other < name; });
     const uint32_t crc = crc_of_values(0, image.floats.data() + c, image.n_pixels(), channels.size() * sizeof(float));
@@ -75,21 +75,21 @@ void check_checksums(const TexelImage& image, const ImageHeader& header, const s
   }
 }
 
-/// Bytes of a texel in the file's channels, and of those that are kept.
+/// Bytes per texel with all channels of the file, and with those that are kept.
 struct TexelBytes {
   double read, kept;
 };
 
-/// What a use of texels takes per pixel at its peak.
+/// Peak memory per pixel of one use of the texels.
 using BytesPerPixel = double (*)(const TexelBytes&, bool bytes_of_colours);
 
-/// The texels, and their copy in blocks; colours of bytes are words there.
+/// The texels and their copy in blocks; byte colours are padded to 32 bits there.
 double bytes_of_texture(const TexelBytes& texel, bool bytes_of_colours) {
   return texel.read + std::max(texel.read == texel.kept ? 0 : texel.kept,
                                bytes_of_colours ? static_cast<double>(sizeof(uint32_t)) : texel.kept);
 }
 
-/// The texels with the linear image; then that with texels of four floats, and their tables.
+/// First the texels and the linear image; then that image, its texels as four floats each, and their tables.
 double bytes_of_environment(const TexelBytes& texel, bool) {
   constexpr double kLinear = 3 * sizeof(float), kTexel = 4 * sizeof(float), kTables = 2;
   return std::max(texel.read + kLinear, kLinear + kTexel + kTables);
@@ -143,7 +143,7 @@ namespace {
 
 [[noreturn]] void fail() { throw Error(ErrorCode::kInput, "the embedded image is not a PGM, PPM or PFM file"); }
 
-/// The header's next word; one blank behind it is taken, too.
+/// The next word of the header; also consumes one white-space character after it.
 std::string_view take_word(std::string_view& bytes) {
   const size_t end = std::min(bytes.find_first_of(" \n"), bytes.size());
   const std::string_view word = bytes.substr(0, end);
@@ -177,7 +177,7 @@ TexelImage read_embedded_image(std::string_view bytes) {
     return image;
   }
   image.floats.resize(n);
-  for (size_t y = 0; y < static_cast<size_t>(image.height); ++y)  // rows from the lowest up
+  for (size_t y = 0; y < static_cast<size_t>(image.height); ++y)  // rows from bottom to top
     std::memcpy(&image.floats[y * row], bytes.data() + (image.height - 1 - y) * row * sizeof(float),
                 row * sizeof(float));
   if (!std::all_of(image.floats.begin(), image.floats.end(), [](float x) { return std::isfinite(x); })) fail();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files that must be rejected with a message that names them. Correct files: bitmap_test.cpp.
+// Files that must be rejected with an error naming them. Valid files: bitmap_test.cpp.
 #include "textures/image.h"
 
 #include <OpenImageIO/imageio.h>
@@ -27,7 +27,7 @@ std::string error_of(const std::string& path) {
 
 void write(const std::string& path, const std::string& bytes) { std::ofstream(path, std::ios::binary) << bytes; }
 
-/// A picture of random numbers, which no format can pack.
+/// An image of random numbers, which no format can compress.
 void write_noise(const std::string& path, int width, int height, const std::vector<std::string>& channels) {
   const auto output = OIIO::ImageOutput::create(path);
   ASSERT_TRUE(output);
@@ -64,7 +64,7 @@ TEST(Image, RejectsTruncatedFiles) {
     const TexelImage whole = read_texels(path);
     EXPECT_EQ(whole.width, 64) << name;
     std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
-    const test_support::LeaksOfOthers of_openimageio;  // libpng jumps out of its reader past a string
+    const test_support::LeaksOfOthers of_openimageio;  // libpng longjmps past the destructor of a string
     const std::string error = error_of(path);
     const bool is_found_when_opened = error.find(path + ": not an image that can be read: TGA header claims") == 0;
     EXPECT_TRUE(error.find(path + ": damaged or incomplete image: ") == 0 || is_found_when_opened) << name << error;
@@ -80,7 +80,7 @@ TEST(Image, RejectsEmptyAndAbsurdSizes) {
   const std::string png = folder.file("huge.png");
   write_noise(png, 8, 8, {"R", "G", "B"});
   std::fstream file(png, std::ios::in | std::ios::out | std::ios::binary);
-  file.seekp(16);  // width and height in the header; its checksum is wrong now, which is an error as well
+  file.seekp(16);  // width and height in the header; the checksum becomes wrong, which is an error as well
   file << std::string("\x00\x0f\x00\x00\x00\x0f\x00\x00", 8);
   file.close();
   EXPECT_NE(error_of(png).find(png), std::string::npos) << error_of(png);
@@ -106,7 +106,7 @@ TEST(Image, FindsColoursAmongOtherChannels) {
   write_noise(path, 4, 4, {"depth", "B", "G", "id", "R"});
   const TexelImage image = read_texels(path);
   ASSERT_EQ(image.channels, 3);
-  // OpenEXR stores channels by name; whatever their order in the file, value i of the written five is that of its name.
+  // OpenEXR stores channels by name; whatever their order in the file, value i of the five written is that of its name.
   const auto written = [](size_t i) { return static_cast<float>(static_cast<uint8_t>((i * 2654435761u) >> 13)) / 255; };
   for (size_t i = 0; i < 16; ++i) {
     EXPECT_FLOAT_EQ(image.floats[3 * i], written(5 * i + 4));

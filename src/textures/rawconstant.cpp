@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `rawconstant`: a number or a vector everywhere, never taken for a colour.
+// `rawconstant`: a constant number or vector, never interpreted as a colour.
 //
 // | parameter | type            | default  | meaning      |
 // |-----------|-----------------|----------|--------------|

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The textures by the name scene files use; each plugin's file documents its parameters. A new texture: a word in
+// Textures by the names used in scene files; each plugin's file documents its parameters. To add one: a line in
 // registry.cpp, a file in CMake.
 #pragma once
 
@@ -10,7 +10,7 @@
 
 namespace covary {
 
-/// All of a kind, sorted by name.
+/// All plugins of a kind, sorted by name.
 std::span<const Plugin<Texture>> texture_plugins();
 
 }  // namespace covary

@@ -19,7 +19,8 @@ class ScaledTexture final : public Texture {
   float eval_1(const SurfaceHit& hit) const override {
     return grey_ ? nested_->eval_1(hit) * scale_.r : luminance(eval(hit));
   }
-  /// For a coloured factor, of the nested luminance times the factor's: nobody bump-maps colours.
+  /// For a coloured factor: gradient of the nested luminance times the luminance of the factor, since bump maps are not
+  /// colours.
   Vec2 grad_1(const SurfaceHit& hit) const override { return nested_->grad_1(hit) * factor(); }
   bool is_constant() const override { return nested_->is_constant(); }
   float mean() const override { return nested_->mean() * factor(); }

@@ -8,7 +8,8 @@
 
 namespace covary {
 
-// The role is that of emission because it has no upper bound: whoever uses the texture knows whether it needs one.
+// Reads the value in the role of emission, which has no upper bound; the user of the texture knows whether it needs
+// one.
 std::shared_ptr<Texture> make_uniform(Parameters& parameters) {
   return std::make_shared<ConstantTexture>(parameters.get_spectrum("value", Spectrum(1), SpectrumRole::kEmission));
 }

@@ -5,8 +5,8 @@
 
 namespace covary {
 
-/// Affine map of surface parameters (u, v): the parameter `to_uv`. Of a 4 x 4 matrix it takes rows and columns x, y and
-/// the translation, like Mitsuba 3.
+/// Affine map of surface parameters (u, v): the parameter `to_uv`. Uses rows and columns x, y and the translation of a
+/// 4 x 4 matrix, like Mitsuba 3.
 class UvTransform {
  public:
   UvTransform() = default;
@@ -24,7 +24,7 @@ class UvTransform {
   /// Gradient with respect to (u, v) of a function whose gradient with respect to apply(u, v) is `g`.
   Vec2 chain(Vec2 g) const { return {a_[0][0] * g.x + a_[1][0] * g.y, a_[0][1] * g.x + a_[1][1] * g.y}; }
 
-  /// Whether the unit square is mapped onto itself: flips, transposition, quarter turns.
+  /// Whether it maps the unit square to itself: flips, transposition, quarter turns.
   bool permutes_unit_square() const {
     int corners_hit = 0;
     for (int i = 0; i < 4; ++i) {
@@ -36,7 +36,7 @@ class UvTransform {
     }
     return corners_hit == 15;
   }
-  /// Inverse of apply(); only when permutes_unit_square(), where the linear part is orthogonal.
+  /// Inverse of apply(); only if permutes_unit_square(), where the linear part is orthogonal.
   Vec2 apply_inverse(Vec2 st) const { return chain({st.x - b_[0], st.y - b_[1]}); }
 
  private:

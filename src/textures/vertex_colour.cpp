@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Values stored at the vertices of a mesh, interpolated over its triangles, or with its triangles; white on shapes
-// without such values.
+// Attributes stored at the vertices of a mesh and interpolated over its triangles, or stored per triangle; white on
+// shapes without the attribute.
 //
 // `vertexcolor` (Mitsuba 0.x) has no parameters. `mesh_attribute` (Mitsuba 3):
 //
@@ -22,7 +22,7 @@ class MeshAttributeTexture final : public Texture {
   Spectrum eval(const SurfaceHit& hit) const override { return hit.shape->attribute(name_, hit) * scale_; }
   float eval_1(const SurfaceHit& hit) const override { return luminance(eval(hit)); }
   Vec2 grad_1(const SurfaceHit&) const override { return {0, 0}; }
-  /// Unknown here, since one texture serves many meshes: the middle of [0, 1].
+  /// Not known, because one texture serves many meshes: the middle of [0, 1].
   float mean() const override { return 0.5f * scale_; }
 
  private:

@@ -48,7 +48,7 @@ TEST(VertexColour, RefusesOtherNames) {
       << made.errors;
 }
 
-/// Two triangles of which the first has no area: what the second has must stay with it.
+/// The first of two triangles has zero area and is dropped: the second must keep its own values.
 TEST(MeshAttribute, IsOfTheVertexOrTheFace) {
   MeshData data;
   data.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
