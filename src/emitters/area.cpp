@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `area`: a surface that emits light, nested in a shape.
+// `area`: an emissive surface, nested in a shape.
 //
 // | parameter | type            | default | meaning                                                   |
 // |-----------|-----------------|---------|-----------------------------------------------------------|
@@ -50,7 +50,8 @@ AreaSample AreaLight::sample_position(Vec2 u, float u_primitive) const {
 }
 
 EmitterSample AreaLight::sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const {
-  // Meshes with colours are sampled by area, and the colour is that of a triangle, which an EmitterSample has not.
+  // Meshes with colours are sampled by area: their colour depends on the triangle, which an EmitterSample does not
+  // store.
   if (samples_uv_ || (textured_ && shape_->has_attributes()))
     return towards(reference, sample_position(u, u_primitive));
   EmitterSample sample = shape_->sample_towards(reference, u, u_primitive);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light emitted by a surface. The shape owns its light (Shape::set_emitter); the light only refers to the shape. A
-// scene file may use one description for several shapes: each shape then gets its own clone, which shares the texture.
+// Area lights. The shape owns its light (Shape::set_emitter); the light only refers to the shape. If a scene file uses
+// one description for several shapes, each shape gets its own clone, which shares the texture.
 //
 //     auto light = prototype.clone();
 //     light->attach(shape.get());
@@ -18,11 +18,11 @@ namespace covary {
 
 class AreaLight final : public Emitter {
  public:
-  /// `radiance` must not be null. Emits on the side the geometric normal points to, equally in all directions of it.
+  /// `radiance` must not be null. Emits uniformly over the hemisphere on the side of the geometric normal.
   explicit AreaLight(TexturePtr radiance);
 
-  /// Sets the surface that emits; call it once, when the shape is complete, before anything else but clone(). `shape`
-  /// must outlive the light.
+  /// Sets the shape that emits; call once, when the shape is complete, before anything else but clone(). `shape` must
+  /// outlive the light.
   void attach(const Shape* shape);
   /// The same light without a shape.
   std::shared_ptr<AreaLight> clone() const {
@@ -35,8 +35,8 @@ class AreaLight final : public Emitter {
   const SphereLight* sphere() const override { return sphere_ ? &*sphere_ : nullptr; }
 
   Spectrum surface_radiance(const SurfaceHit& hit, const Vec3& w) const override;
-  /// Textured lights on shapes whose (u, v) cover the unit square (Shape::sample_uv): positions in proportion to the
-  /// texture's luminance. All others: as the shape likes best from the reference point.
+  /// Textured lights on shapes whose (u, v) cover the unit square (Shape::sample_uv) sample positions in proportion to
+  /// the texture's luminance; all others use the shape's own sampling from the reference point.
   EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const override;
   float pdf_solid_angle(const Vec3& reference, const SurfaceHit& hit) const override;
   uint32_t n_parts() const override { return shape_->n_parts(); }
@@ -46,23 +46,23 @@ class AreaLight final : public Emitter {
   Spectrum part_power(uint32_t part) const override;
   EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float u_primitive) const override;
   EmissionPdf pdf_emission(const SurfaceHit& hit, const Vec3& w) const override;
-  /// pi times the integral of the radiance over the surface; for textures by quadrature.
+  /// pi times the integral of radiance over the surface; by quadrature for textures.
   Spectrum power() const override;
   bool knows_power() const override { return !textured_; }
 
  private:
-  /// A point chosen by position only, with its density per unit area.
+  /// A sampled surface point with its density per unit area.
   AreaSample sample_position(Vec2 u, float u_primitive) const;
   Spectrum radiance_at(const AreaSample& at) const;
-  /// The point as seen from `reference`.
+  /// Converts the point to a sample from `reference` (density per unit solid angle).
   EmitterSample towards(const Vec3& reference, const AreaSample& at) const;
 
-  /// Power by quadrature with so many points that position(u, u_primitive) gives.
+  /// Power by quadrature over `n_points` points given by position(u, u_primitive).
   template <typename Position>
   Spectrum power_of(int n_points, const Position& position) const;
 
   TexturePtr radiance_;
-  Spectrum constant_;  // the radiance where it does not vary
+  Spectrum constant_;  // the radiance if it does not vary
   bool textured_;
   bool samples_uv_ = false;
   const Shape* shape_ = nullptr;

@@ -19,7 +19,7 @@ namespace {
 
 using namespace test_support;
 
-/// The square [-1, 1]^2 in z = 0 under `t`, normal +z, (u, v) over the unit square; scene files call it `rectangle`.
+/// The square [-1, 1]^2 in z = 0 under `t`, normal +z, (u, v) over the unit square: the scene files' `rectangle`.
 std::shared_ptr<TriangleMesh> rectangle(const Transform& t) {
   MeshData data;
   for (const Vec3& p : {Vec3{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}) data.positions.push_back(t.point(p));
@@ -43,14 +43,14 @@ const Transform kPlaced =
     Transform::translate({0.3f, -0.2f, 2}) * Transform::rotate({1, 0.4f, 0}, 160) * Transform::scale({0.8f, 1.3f, 1});
 const Vec3 kReference = {0.2f, 0.1f, -0.4f};
 
-/// Coordinates on the unit square in which the density of a light's directions is smooth, so that its integrals are
-/// exact: surface parameters, or, for a sphere seen from outside, a map of the cone it fills.
+/// Coordinates on the unit square in which the density of a light's directions is smooth, so that quadrature is
+/// accurate: surface parameters, or, for a sphere seen from outside, a parameterisation of its cone.
 struct Chart {
   std::function<std::optional<Vec2>(const EmitterSample&)> coordinates;
   std::function<double(Vec2)> density;  ///< of the light's own pdf_solid_angle(), per unit area of the square
 };
 
-/// Chart by (u, v). `at`: the surface point, with pdf_area the inverse of its area per unit (u, v) area.
+/// Chart by (u, v). `at`: surface point whose pdf_area is the inverse of its area per unit (u, v) area.
 Chart surface_chart(const LightScene& scene, const std::function<AreaSample(Vec2)>& at) {
   return {[](const EmitterSample& s) { return s.uv; },
           [&scene, at](Vec2 uv) {
@@ -59,7 +59,7 @@ Chart surface_chart(const LightScene& scene, const std::function<AreaSample(Vec2
             hit.p = point.p, hit.ng = point.n, hit.uv = uv, hit.shape = scene.light().shape();
             const Vec3 d = point.p - kReference;
             const double d2 = length_squared(d), cosine = std::abs(dot(d, point.n)) / std::sqrt(d2);
-            // Per unit solid angle to per unit area to per unit (u, v).
+            // From per unit solid angle to per unit area to per unit (u, v).
             return scene.light().pdf_solid_angle(kReference, hit) * cosine / d2 / point.pdf_area;
           }};
 }
@@ -114,7 +114,7 @@ Chart rectangle_chart(const LightScene& scene) {
   return surface_chart(scene, [](Vec2 uv) { return rectangle(kPlaced)->sample_uv(uv); });
 }
 
-/// A rectangle whose texture is stretched, so that (u, v) do not cover the unit square: no sampling by luminance.
+/// A rectangle with a stretched texture, whose (u, v) do not cover the unit square: no sampling by luminance.
 std::shared_ptr<TriangleMesh> stretched() {
   MeshData data;
   for (const Vec3& p : {Vec3{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}) data.positions.push_back(kPlaced.point(p));
@@ -129,7 +129,7 @@ Chart stretched_chart(const LightScene& scene) {
   return chart;
 }
 
-/// The mesh with a colour of its own at each vertex, from few to many times as bright.
+/// The mesh with a colour per vertex, over a wide range of brightness.
 std::shared_ptr<TriangleMesh> coloured(const TriangleMesh& mesh) {
   MeshData data;
   for (const auto& vertex : mesh.vertices()) {
@@ -166,7 +166,7 @@ const Case kCases[] = {
 
 class AreaLights : public testing::TestWithParam<Case> {};
 
-// N = 400 000, alpha = 5e-7: sees 2.3 % rms error of the density with power 0.99 (statistics/chi2.h).
+// N = 400 000, alpha = 5e-7: detects an rms error of 2.3 % of the density with power 0.99 (statistics/chi2.h).
 TEST_P(AreaLights, DirectionsFollowTheirDensity) {
   const LightScene scene = GetParam().make();
   const Chart chart = GetParam().chart(scene);
@@ -191,7 +191,7 @@ TEST_P(AreaLights, SamplesAgreeWithHits) {
     if (!(s.pdf_solid_angle > 0)) continue;
     EXPECT_NEAR(length(s.p - kReference), s.distance, 1e-5f * s.distance);
     SurfaceHit hit;
-    if (is_black(s.radiance)) continue;  // the back of a surface: perhaps hidden
+    if (is_black(s.radiance)) continue;  // back-facing: perhaps hidden
     ++n_lit;
     ASSERT_TRUE(scene.scene().intersect({kReference, s.wi}, hit));
     if (hit.t < s.distance * 0.999f) continue;  // hidden by another part of the light
@@ -199,7 +199,7 @@ TEST_P(AreaLights, SamplesAgreeWithHits) {
     EXPECT_LT(length(hit.ng - s.n), 1e-3f);
     const Spectrum seen = scene.light().surface_radiance(hit, -s.wi);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen[c], s.radiance[c], 1e-3f * (1 + s.radiance[c]));
-    if (std::abs(dot(hit.ng, s.wi)) < 0.05f) continue;  // grazing: the cosine has few digits
+    if (std::abs(dot(hit.ng, s.wi)) < 0.05f) continue;  // grazing: the cosine is imprecise
     EXPECT_NEAR(scene.light().pdf_solid_angle(kReference, hit), s.pdf_solid_angle, 2e-3f * s.pdf_solid_angle);
   }
   EXPECT_GT(n_lit, 100);
@@ -209,7 +209,7 @@ TEST_P(AreaLights, EmittedRaysCarryThePower) {
   const LightScene scene = GetParam().make();
   const double power = luminance(scene.light().power());
   const auto estimate = [&](const PathRandom& r) { return power_estimate(scene.light(), true, r); };
-  // The power of textured lights is a sum over 4096 points: 1 % covers its error.
+  // Power of textured lights is a sum over 4096 points, with an error below 1 %.
   EXPECT_TRUE(mean_test(estimate, power, 200000, 1e-2 * power).accepted);
   EXPECT_FALSE(
       mean_test([&](const PathRandom& r) { return 1.05 * estimate(r); }, power, 200000, 1e-2 * power).accepted);
@@ -243,7 +243,7 @@ TEST(AreaLight, IrradianceOfADisk) {
 }
 
 TEST(AreaLight, IrradianceOfASphere) {
-  // pi L (r / d)^2 for a surface that faces the centre, which sees all of the sphere's visible side.
+  // pi L (r / d)^2 for a surface that faces the centre and sees the whole visible side of the sphere.
   expect_irradiance(
       LightScene(std::make_shared<Sphere>(Transform(), Vec3{0, 3, 0}, 1.0f, false), constant(Spectrum(2))), {0, 1, 0},
       M_PI * 2 / 9);
@@ -262,7 +262,7 @@ TEST(AreaLight, IrradianceOfARectangle) {
 }
 
 TEST(AreaLight, IrradianceOfAPictureFromAllStrategies) {
-  // By the midpoint rule over the surface; both ways of sampling must find it.
+  // By the midpoint rule over the surface; both sampling strategies must agree with it.
   const LightScene by_luminance(rectangle(kPlaced), picture());
   const auto mesh = rectangle(kPlaced);
   const Vec3 n = {0, 0, 1};
@@ -279,7 +279,7 @@ TEST(AreaLight, IrradianceOfAPictureFromAllStrategies) {
                   at.pdf_area / (kGrid * kGrid);
     }
   expect_irradiance(by_luminance, n, expected);
-  // A third triangle far away, seen edge-on, keeps the mesh from being a parallelogram: uniform by area.
+  // A third triangle far away, seen edge-on, so that the mesh is not a parallelogram: sampled uniformly by area.
   MeshData data;
   for (const auto& v : mesh->vertices()) data.positions.push_back(v.p), data.uvs.push_back(v.uv);
   data.triangles = mesh->triangles();
@@ -325,7 +325,7 @@ TEST(AreaLight, ClonesShareTheTextureButNotTheShape) {
   light.attach(shape.get());
   const auto clone = light.clone();
   EXPECT_EQ(clone->shape(), nullptr);
-  EXPECT_THROW(light.attach(shape.get()), Error);  // belongs to a shape already
+  EXPECT_THROW(light.attach(shape.get()), Error);  // already attached to a shape
   const auto other = rectangle(kPlaced);
   clone->attach(other.get());
   EXPECT_EQ(clone->shape(), other.get());

@@ -14,7 +14,7 @@ namespace {
 class ConstantLight final : public Emitter {
  public:
   explicit ConstantLight(Parameters& p) : radiance_(p.get_spectrum("radiance", Spectrum(1), SpectrumRole::kEmission)) {
-    p.get_transform("to_world");  // harmless: nothing to rotate
+    p.get_transform("to_world");  // ignored: nothing to rotate
   }
 
   std::shared_ptr<const Emitter> in_scene(const Bounds3& bounds) const override {

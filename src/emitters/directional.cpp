@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `directional`: parallel light from infinitely far away.
+// `directional`: parallel light from a source at infinity.
 //
 // | parameter  | type      | default  | meaning                                                        |
 // |------------|-----------|----------|----------------------------------------------------------------|

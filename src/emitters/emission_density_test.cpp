@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Densities of light that leaves an emitter: pdf_emission() against sample_emission(), by chi-square tests and
-// quadrature.
+// Densities of emitted light: pdf_emission() against sample_emission(), by chi-square tests and quadrature.
 //
-// Chi-square tests: N = 100 000 in 64 cells, alpha = 5e-7; they see 3.5 % rms error of a density with power 0.99.
+// Chi-square tests: N = 100 000 in 64 cells, alpha = 5e-7; they detect an rms error of 3.5 % of a density with power
+// 0.99.
 #include <OpenImageIO/imageio.h>
 #include <gtest/gtest.h>
 
@@ -48,7 +48,7 @@ std::shared_ptr<Shape> rectangle(const Transform& t, float u_end = 1, bool flip 
   return std::make_shared<TriangleMesh>(std::move(data));
 }
 
-/// Surface parameters of an area light as coordinates of the unit square. `spread`: surface area per unit area of it.
+/// Surface parameters of an area light as coordinates on the unit square. `spread`: surface area per unit area of it.
 struct Case {
   const char* name;
   std::shared_ptr<Shape> (*shape)();
@@ -100,7 +100,7 @@ const Case kCases[] = {
 class AreaEmission : public testing::TestWithParam<Case> {
  protected:
   const AreaLight& light() const { return scene_.light(); }
-  /// Density of emission at the surface parameters that coordinates of the unit square stand for, per unit area of it.
+  /// Density of emission, per unit area of the unit square, at the surface point of these coordinates.
   double density(Vec2 x) const {
     const Vec2 uv{x.x * GetParam().u_end, x.y};
     return light().pdf_emission(point_on_light({}, {0, 0, 1}, uv), {0, 0, 1}).position * GetParam().spread(uv);
@@ -144,13 +144,13 @@ TEST_P(AreaEmission, SamplesCarryTheirDensities) {
     EXPECT_NEAR(pdf.position, s.pdf_position, 1e-4f * s.pdf_position);
     EXPECT_NEAR(pdf.direction, s.pdf_direction, 1e-4f * s.pdf_direction);
     EXPECT_FALSE(s.delta_position || s.delta_direction);
-    // A path that ends there asks for the same.
+    // Paths that hit this point ask for the same density.
     SurfaceHit hit;
     ASSERT_TRUE(scene_.scene().intersect({s.ray.o + s.ray.d * 1e-2f, -s.ray.d, 2e-2f}, hit));
     const EmissionPdf found = light().pdf_emission(hit, s.ray.d);
     EXPECT_NEAR(found.position, s.pdf_position, 2e-2f * s.pdf_position);
     EXPECT_NEAR(found.direction, s.pdf_direction, 1e-3f);
-    // And what sample_towards() would have drawn there depends on the point alone, too.
+    // The density of sample_towards() for this point also depends on the point alone.
     const Vec3 from = s.ray.at(0.5f);
     EXPECT_NEAR(light().pdf_solid_angle(from, point_on_light(s.ray.o, s.n, s.uv)), light().pdf_solid_angle(from, hit),
                 3e-2f * light().pdf_solid_angle(from, hit));
@@ -159,7 +159,7 @@ TEST_P(AreaEmission, SamplesCarryTheirDensities) {
   EXPECT_EQ(light().pdf_emission(at, {0, 0.6f, -0.8f}).direction, 0);
 }
 
-// The mean of what emitted rays carry, N = 200 000, against the integral of radiance and cosine over the surface.
+// Mean power carried by emitted rays, N = 200 000, against the integral of radiance and cosine over the surface.
 TEST_P(AreaEmission, PowerIsTheIntegralOfRadiance) {
   double expected = 0;
   constexpr int kGrid = 500;
@@ -205,7 +205,7 @@ void expect_directions_follow_density(const Emitter& light, const std::string& n
   o.mass_tolerance = mass_tolerance;
   const auto result = statistics::chi2_sphere(sampler, pdf, o);
   EXPECT_TRUE(result.accepted) << result.message;
-  const auto wrong =  // planted: the direction towards the light in place of the one away from it
+  const auto wrong =  // planted: the direction towards the light instead of away from it
       statistics::chi2_sphere(
           sampler, [&](const Vec3& w) { return pdf(-w) * (1.1 - 0.2 * (w.x > 0)); }, o);
   EXPECT_FALSE(wrong.accepted);
@@ -260,8 +260,8 @@ TEST(Emission, EnvironmentMap) {
   }
 }
 
-// Light that sample_emission() sends through a square in the scene, N = 400 000 rays, is the irradiance on it, which
-// sample_towards() finds: positions on the disk and directions fit together.
+// sample_emission() through a square in the scene, N = 400 000 rays, against the irradiance by sample_towards(): tests
+// positions on the disk and directions together.
 TEST(Emission, InfiniteLightsLightASurfaceEvenly) {
   const Vec3 corner{-0.5f, -1.2f, -2}, e1{2.6f, 0.4f, 0}, e2{-0.2f, 2.4f, 0.6f}, area = cross(e1, e2);
   const Vec3 n = normalize(area);

@@ -7,26 +7,26 @@
 namespace covary {
 namespace {
 
-/// Integrals over one row step d, in units of that step, of the tent (1 - t) on the side of row `theta` where the angle
-/// grows with `direction` (+1 or -1), times sin(theta + direction t d).
+/// Integral over t in [0, 1] of the tent (1 - t) times sin(theta + direction t d): half the tent of the row at angle
+/// `theta`, with row spacing d; `direction` is +1 or -1.
 double tent_times_sine(double theta, double d, double direction) {
   const double end = theta + direction * d;
-  // By parts; the difference loses digits for tiny d, where double precision still leaves plenty.
+  // Integrated by parts; the difference cancels for tiny d, but double precision leaves enough digits.
   return direction * std::cos(theta) / d - (std::sin(end) - std::sin(theta)) / (d * d);
 }
 
 struct CellChoice {
   int index;
-  float remapped;  // again uniform in [0, 1)
+  float remapped;  // uniform in [0, 1) again
 };
 
 /// Chooses one of four cells in proportion to their weights, at least one of which is positive.
 CellChoice choose_cell(const float (&weights)[4], float u) {
-  // Bounds between cells; comparisons instead of branches, which would be guessed wrong half of the time.
+  // Cell boundaries; comparisons instead of branches, half of which would be mispredicted.
   const float b1 = weights[0], b2 = b1 + weights[1], b3 = b2 + weights[2], sum = b3 + weights[3];
   const float x = u * sum;
   int index = (x >= b1) + (x >= b2) + (x >= b3);
-  while (!(weights[index] > 0)) index = (index + 3) % 4;  // rounding can reach into an empty last cell
+  while (!(weights[index] > 0)) index = (index + 3) % 4;  // rounding can select an empty last cell
   const float lower = index == 0 ? 0 : (index == 1 ? b1 : (index == 2 ? b2 : b3));
   return {index, std::clamp((x - lower) / weights[index], 0.0f, kOneMinusEpsilon)};
 }
@@ -39,7 +39,7 @@ EnvironmentImage::EnvironmentImage(const TexelImage& image, float scale, bool mi
                "an environment needs a linear RGB image");
   texels_.resize(layout_.size());
 
-  // Values, and the integral over the sphere: each row's tent against the sine.
+  // Copies the texels and integrates over the sphere: the tent of each row against the sine.
   const double step = static_cast<double>(M_PI) / (height_ - 1);
   double integral[3] = {0, 0, 0}, luminance_integral = 0;
   for (int y = 0; y < height_; ++y) {
@@ -86,7 +86,7 @@ void EnvironmentImage::make_tables(bool mis_compensation) {
     std::fill(row.begin(), row.end(), 0.0f);
     double sum = 0;
     for (int y = block_y * kBlock; y < std::min((block_y + 1) * kBlock, height_); ++y) {
-      // The mean sine of a tent on a pole is a third of a row away from it.
+      // The tent at a pole has the mean sine of a third of a row away.
       const double sine = tent_mass(y) < 1 ? std::sin(step / 3) : std::sin(y * step);
       for (int x = 0; x < width_; ++x) {
         Texel& texel = texels_[layout_.index(x, y)];
@@ -140,7 +140,7 @@ EnvironmentImage::Sample EnvironmentImage::sample(Vec2 u) const {
   if (black_) return {{0, 1, 0}, Spectrum(), 0};
   const BlockChoice chosen = choose_block(u);
 
-  // A texel of the block: its row by what is left of u.y, its column by what is left of u.x.
+  // A texel of the block: row from the remapped u.y, column from the remapped u.x.
   const Texel* texels = block(chosen);
   const int x0 = static_cast<int>(chosen.x) * kBlock, y0 = static_cast<int>(chosen.y) * kBlock;
   float row_weights[kBlock], columns[kBlock];
@@ -152,7 +152,7 @@ EnvironmentImage::Sample EnvironmentImage::sample(Vec2 u) const {
   for (int i = 0; i < kBlock; ++i) columns[i] = texels[row.index * kBlock + i].weight;
   const CellChoice column = choose_cell(columns, chosen.remapped.x);
 
-  // A position in the texel's tent, or in the half of it that lies inside the image.
+  // A position in the texel's tent, or at a pole in the half of it that lies inside the image.
   const int y = y0 + row.index;
   const float half_tent = 1 - safe_sqrt(1 - row.remapped);
   const float offset = y == 0 ? half_tent : (y == height_ - 1 ? -half_tent : warp::interval_to_tent(row.remapped, 1));

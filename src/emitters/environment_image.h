@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// An image on the sphere of directions, and a sampler whose density follows its bilinear interpolation.
+// An image on the sphere of directions, with a sampler whose density follows its bilinear interpolation.
 //
 // Mapping (Mitsuba 3's): u = atan2(x, -z) / 2 pi wraps around, v = acos(y) / pi runs from the top (+y) to the bottom.
-// Texel column i has its centre at u = (i + 0.5) / width; row j stands at v = j / (height - 1), the first and the last
-// row on the poles.
+// Texel column i is centred at u = (i + 0.5) / width; row j lies at v = j / (height - 1), so the first and last rows
+// are the poles.
 //
-// Sampling. With h the tent functions of the interpolation, and texel weights w_ij = sin(theta_j) max(0, luminance -
+// Sampling. With the tent functions h of the interpolation and texel weights w_ij = sin(theta_j) max(0, luminance -
 // offset), the density per unit (u, v) area is the interpolation of the weights,
 //     p(u, v) = sum_ij w_ij h_i(u) h_j(v) / Z,
-// drawn by choosing a texel, then a position within its tent. Per unit solid angle that is the luminance over its
-// integral, but for how the sine changes within a row: the estimate of the light from the map is nearly constant
-// however small the sun, and the density is positive wherever the interpolated luminance is (the rows on the poles take
-// the mean sine of their tents, not zero).
+// sampled by choosing a texel, then a position within its tent. Per unit solid angle this is the luminance over its
+// integral, except for how the sine varies within a row: value over density is nearly constant however small the sun,
+// and the density is positive wherever the interpolated luminance is (rows at the poles use the mean sine of their
+// tents, not zero).
 //
-// Texels lie in blocks of 4 x 4, and the tables choose blocks: tables of a sixteenth of the size stay in the cache, and
-// a sample then reads one or two places of the large array.
+// Texels are stored in 4 x 4 blocks, and the tables choose blocks: tables a sixteenth of the size stay in cache, and a
+// sample then touches one or two places in the large array.
 #pragma once
 
 #include <vector>
@@ -30,12 +30,11 @@ namespace covary {
 
 class EnvironmentImage {
  public:
-  /// `image`: linear RGB floats as from read_linear_rgb; at least one pixel; one of fewer than three rows repeats its
-  /// last row. `scale` multiplies all values, >= 0.
-  /// `mis_compensation`: subtract the mean luminance from the sampling weights (Karlík et al. 2019), for use together
-  /// with a technique that covers all directions.
+  /// `image`: linear RGB floats as from read_linear_rgb(), at least one pixel; with fewer than three rows, the last row
+  /// is repeated. `scale` multiplies all values, >= 0. `mis_compensation`: subtract the mean luminance from the
+  /// sampling weights (Karlík et al. 2019), for use together with a strategy that covers all directions.
   EnvironmentImage(const TexelImage& image, float scale, bool mis_compensation);
-  /// The same light, sampled as with `mis_compensation`.
+  /// The same light, sampled with `mis_compensation`.
   EnvironmentImage compensated() const;
   bool is_compensated() const { return compensated_; }
 
@@ -48,11 +47,11 @@ class EnvironmentImage {
   struct Sample {
     Vec3 d;
     Spectrum value;
-    float pdf_solid_angle;  ///< 0 when the image is black
+    float pdf_solid_angle;  ///< 0 if the image is black
   };
   Sample sample(Vec2 u) const;
-  /// Ask memory for what sample(u) reads, which may lie anywhere in arrays larger than the caches: the entry of the
-  /// table of blocks, and when that has arrived, the texels of the block.
+  /// Prefetch what sample(u) reads, which may lie anywhere in arrays larger than the caches: the entry in the table of
+  /// blocks, and, once that has arrived, the texels of the block.
   void prefetch_table(Vec2 u) const;
   void prefetch_texels(Vec2 u) const;
 
@@ -63,9 +62,9 @@ class EnvironmentImage {
   static constexpr int kBlock = BlockLayout::kBlock;
   struct Texel {
     Spectrum value;
-    float weight;  // w; zero for texels beyond the image
+    float weight;  // w; zero for padding
   };
-  /// The block sample(u) looks into, and what is left of u.
+  /// The block that sample(u) uses, and the remapped u.
   struct BlockChoice {
     uint32_t x, y;
     Vec2 remapped;
@@ -84,19 +83,19 @@ class EnvironmentImage {
     float pdf_uv;
   };
   UvLookup lookup_uv(float u, float v) const;
-  /// The share of a row's tent that lies inside the image.
+  /// Fraction of a row's tent that lies inside the image.
   float tent_mass(int row) const { return row == 0 || row == height_ - 1 ? 0.5f : 1.0f; }
 
-  /// Sampling weights and tables of the values.
+  /// Computes sampling weights and tables from the values.
   void make_tables(bool mis_compensation);
 
   int width_, height_;
   BlockLayout layout_;
   LargeVector<Texel> texels_;
-  Discrete block_rows_;  // empty when nothing is to be sampled
+  Discrete block_rows_;  // empty if nothing is to be sampled
   std::vector<AliasTable> block_columns_;
   bool black_ = true, compensated_ = false;
-  float mean_luminance_ = 0, largest_ = 0;  // of the values: over the sphere, and at a texel
+  float mean_luminance_ = 0, largest_ = 0;  // luminance: mean over the sphere, maximum over texels
   float inverse_z_ = 0;
   Spectrum integral_;
 };

@@ -10,7 +10,7 @@
 namespace covary {
 namespace {
 
-/// Random colours, a quarter of the texels black, and one "sun" texel that holds most of the light.
+/// Random colours, a quarter of the texels black, and one "sun" texel with most of the light.
 TexelImage test_image(int width, int height, float sun) {
   TexelImage image;
   image.width = width, image.height = height, image.channels = 3;
@@ -40,7 +40,7 @@ class EnvironmentSampling : public testing::TestWithParam<Case> {
   }
 };
 
-// N = 400 000, alpha = 5e-7: sees an rms error of the density of 2.3 % with power 0.99 (statistics/chi2.h).
+// N = 400 000, alpha = 5e-7: detects an rms error of 2.3 % of the density with power 0.99 (statistics/chi2.h).
 TEST_P(EnvironmentSampling, DirectionsFollowTheirDensity) {
   const EnvironmentImage environment = this->environment();
   const auto sample = [&](const PathRandom& random) -> std::optional<Vec3> {
@@ -49,7 +49,7 @@ TEST_P(EnvironmentSampling, DirectionsFollowTheirDensity) {
   const auto result = statistics::chi2_sphere(
       sample, [&](const Vec3& d) { return environment.lookup(d).pdf_solid_angle; }, {.name = GetParam().name});
   EXPECT_TRUE(result.accepted) << result.message;
-  // Planted bug: the density per unit (u, v) area taken for one per unit solid angle, right total mass restored.
+  // Planted bug: density per unit (u, v) area used as per unit solid angle, renormalised to the right total mass.
   const auto wrong = statistics::chi2_sphere(sample,
                                              [&](const Vec3& d) {
                                                return environment.lookup(d).pdf_solid_angle *
@@ -66,7 +66,7 @@ TEST_P(EnvironmentSampling, SampleAgreesWithLookup) {
     const EnvironmentImage::Sample s = environment.sample(random.get_2d(0, Event::kLightPosition));
     ASSERT_GT(s.pdf_solid_angle, 0);
     ASSERT_NEAR(length(s.d), 1, 1e-6);
-    // Single precision in direction is worth about 1e-6 texels, over which the value changes by the largest one nearby.
+    // Single precision in direction is about 1e-6 texels, over which the value changes by up to the largest one nearby.
     const EnvironmentImage::Lookup found = environment.lookup(s.d);
     const float slope = 1e-5f * (1 + 3 * GetParam().sun);
     ASSERT_NEAR(luminance(found.value), luminance(s.value), slope + 1e-5f * luminance(s.value));
@@ -90,8 +90,8 @@ INSTANTIATE_TEST_SUITE_P(Cases, EnvironmentSampling,
                                          Case{"compensated", 12, 6, 5, true}),
                          [](const auto& test) { return std::string(test.param.name); });
 
-// The point of it all: value over density is nearly the same for every sample, however bright the sun. What is left is
-// how the sine changes within a row, most of all on the poles.
+// Value over density is nearly the same for every sample, however bright the sun. The remaining variation is that of
+// the sine within a row, largest at the poles.
 TEST(EnvironmentImage, ValueOverDensityIsNearlyConstant) {
   const EnvironmentImage environment(test_image(24, 12, 300), 1, false);
   const double expected = luminance(environment.integral());
@@ -127,7 +127,7 @@ TEST(EnvironmentImage, CompensationLeavesOutWhatIsDarkerThanTheMean) {
     n_bright += luminance(environment.sample(random.get_2d(0, Event::kLightPosition)).value) > 1.5f;
   }
   EXPECT_GT(n_bright, 950);
-  // A constant map has nothing to leave out.
+  // For a constant map, compensation changes nothing.
   std::fill(image.floats.begin(), image.floats.end(), 1.0f);
   EXPECT_GT(EnvironmentImage(image, 1, true).lookup({0, 0, 1}).pdf_solid_angle, 0);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `envmap`: light from infinitely far away, given by an image, mostly in latitude-longitude format; see
-// environment_image.h for the mapping and the sampling.
+// `envmap`: image-based light at infinity, usually in latitude-longitude format; see environment_image.h for the
+// mapping and the sampling.
 //
 // | parameter        | type      | default  | meaning                                                              |
 // |------------------|-----------|----------|----------------------------------------------------------------------|
@@ -8,8 +8,8 @@
 // | scale            | float     | 1        | factor, not negative                                                 |
 // | to_world         | transform | identity | rotation of the map                                                  |
 // | mapping          | string    | see      | latitude_longitude, or equal_area: pbrt-v4's (equal_area_image.h)    |
-// | mis_compensation | boolean   | false    | sample only what is brighter than the mean; right only for           |
-// |                  |           |          | integrators that combine it with the sampling of the surface         |
+// | mis_compensation | boolean   | false    | sample only what exceeds the mean; only valid for                    |
+// |                  |           |          | integrators that combine it with BSDF sampling                       |
 #include "emitters/environment_image.h"
 #include "emitters/equal_area_image.h"
 #include "emitters/registry.h"
@@ -19,7 +19,7 @@
 namespace covary {
 namespace {
 
-/// `Image`: EnvironmentImage, or what has its interface.
+/// `Image`: EnvironmentImage, or a class with the same interface.
 template <typename Image>
 class EnvironmentMap final : public Emitter {
  public:
@@ -71,7 +71,7 @@ class EnvironmentMap final : public Emitter {
   Spectrum power() const override { return image_->integral() * scene_.disk_area(); }
 
  private:
-  std::shared_ptr<const Image> image_;  // large, and shared by copies
+  std::shared_ptr<const Image> image_;  // large; shared by copies
   Rotation rotation_;
   SceneSphere scene_;
 };

@@ -89,9 +89,9 @@ TexelImage latitude_longitude_of(const TexelImage& equal_area) {
   TexelImage result;
   result.width = 2 * equal_area.width, result.height = equal_area.width + 1, result.channels = 3;
   std::vector<double> sums(result.n_pixels() * 4);
-  // Points of equal solid angle, each given to the four texels around it as they are interpolated: a map of one value
-  // stays one, and the light of all together changes by about a thousandth.
-  constexpr int kPoints = 6;  // along the edge of a texel
+  // Splats points of equal solid angle into the four nearest texels with their interpolation weights: a constant map
+  // stays constant, and the total light changes by about a thousandth.
+  constexpr int kPoints = 6;  // per texel side
   const float step = 1.0f / static_cast<float>(kPoints * equal_area.width);
   for (int y = 0; y < kPoints * equal_area.width; ++y) {
     for (int x = 0; x < kPoints * equal_area.width; ++x) {

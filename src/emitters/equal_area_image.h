@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-// A square image on the sphere of directions whose texels cover equal solid angles, as pbrt-v4 has for infinite lights:
-// Clarberg's octahedral mapping (2008). Texels are constant, not interpolated, as pbrt looks them up.
+// A square image on the sphere of directions whose texels cover equal solid angles, as used by pbrt-v4's infinite
+// lights: Clarberg's octahedral mapping (2008). Texels are constant, not interpolated, like pbrt's lookups.
 //
-// With (x, y) in [-1, 1]^2 from the image's upper left corner, s = |x| + |y|, r = min(s, 2 - s) and
-// phi = (pi / 4) (1 + (|y| - |x|) / r) in the first quadrant: |z| = 1 - r^2, z >= 0 inside of the diamond s <= 1, and
-// the signs of the direction's x and y are those of (x, y).
+// With (x, y) in [-1, 1]^2 from the image's upper left corner, s = |x| + |y|, r = min(s, 2 - s) and phi = (pi / 4) (1 +
+// (|y| - |x|) / r) in the first quadrant: |z| = 1 - r^2, z >= 0 inside the diamond s <= 1, and the direction's x and y
+// have the signs of (x, y).
 #pragma once
 
 #include "emitters/environment_image.h"
 
 namespace covary {
 
-/// Direction of a point of the unit square, and the reverse.
+/// Direction of a point in the unit square, and the inverse.
 Vec3 equal_area_direction(Vec2 uv);
 Vec2 equal_area_square(const Vec3& d);
 
-/// The same interface as EnvironmentImage; a density follows the luminance of texels.
+/// Same interface as EnvironmentImage; the density follows the luminance of the texels.
 class EqualAreaImage {
  public:
-  /// `image`: linear RGB floats as from read_linear_rgb. Throws Error(kInput) where it is not square.
+  /// `image`: linear RGB floats as from read_linear_rgb(). Throws Error(kInput) if it is not square.
   EqualAreaImage(TexelImage image, float scale, bool mis_compensation);
   EqualAreaImage compensated() const { return {image_, 1, true}; }
   bool is_compensated() const { return compensated_; }
@@ -42,8 +42,8 @@ class EqualAreaImage {
   bool compensated_;
 };
 
-/// The image in the mapping of EnvironmentImage, twice as wide as it was, half as high as that: texels are means of
-/// what lies around them. For programs that have this mapping only; what is as small as a texel becomes wider.
+/// Resamples to the mapping of EnvironmentImage, twice the width and the original height; each texel is a mean of its
+/// surroundings. For programs that only support that mapping; features of texel size become blurred.
 TexelImage latitude_longitude_of(const TexelImage& equal_area);
 
 }  // namespace covary

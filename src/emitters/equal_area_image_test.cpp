@@ -22,8 +22,8 @@ TexelImage image(int width, float sun) {
   return image;
 }
 
-/// Places that pbrt-v4's EqualAreaSquareToSphere() (src/pbrt/util/math.cpp) has in closed form: the centre is +z, the
-/// corners are -z, the middles of the edges lie on the equator.
+/// Closed-form points of pbrt-v4's EqualAreaSquareToSphere() (src/pbrt/util/math.cpp): the centre is +z, the corners
+/// are -z, the midpoints of the edges lie on the equator.
 TEST(EqualArea, PlacesOfPbrt) {
   const auto expect = [](Vec2 uv, const Vec3& d) {
     EXPECT_LT(length(equal_area_direction(uv) - d), 1e-6f) << uv.x << " " << uv.y;
@@ -39,7 +39,7 @@ TEST(EqualArea, PlacesOfPbrt) {
   expect({0.5f, 0}, {0, -1, 0});
   const float h = std::sqrt(0.5f);
   expect({0.75f, 0.75f}, {h, h, 0});
-  // r = 1/2: z = 3/4, halfway between the axes; below, the same mirrored at the edge of the diamond.
+  // r = 1/2: z = 3/4, halfway between the axes; below, the same point mirrored across the edge of the diamond.
   const float s = std::sqrt(7.0f) / 4;
   expect({0.625f, 0.625f}, {s * h, s * h, 0.75f});
   expect({0.875f, 0.875f}, {s * h, s * h, -0.75f});
@@ -56,7 +56,8 @@ TEST(EqualArea, GoesForthAndBack) {
   }
 }
 
-// N = 100 000 in 64 cells, alpha = 5e-7: sees an rms error of the density of 3.5 % with power 0.99 (statistics/chi2.h).
+// N = 100 000 in 64 cells, alpha = 5e-7: detects an rms error of 3.5 % of the density with power 0.99
+// (statistics/chi2.h).
 TEST(EqualArea, DirectionsFollowTheirDensity) {
   for (const bool compensated : {false, true}) {
     const EqualAreaImage environment(image(4, 5), 1, compensated);
@@ -67,7 +68,7 @@ TEST(EqualArea, DirectionsFollowTheirDensity) {
     const auto result =
         statistics::chi2_sphere(sample, density, {.name = "equal area", .n_samples = 100000, .n_cells = 64});
     EXPECT_TRUE(result.accepted) << result.message;
-    // Planted bug: the lower half taken for the upper one.
+    // Planted bug: the lower hemisphere mistaken for the upper one.
     const auto wrong = statistics::chi2_sphere(sample,
                                                [&](const Vec3& d) {
                                                  return density({d.x, d.y, -d.z});
@@ -92,8 +93,8 @@ TEST(EqualArea, IntegralAndValuesAreThoseOfTheTexels) {
                                      "an image of equal areas is square, but this one has 8 x 2 pixels"));
 }
 
-/// The light of all directions stays within 0.2 %, also where one texel has most of it; a map of one value stays one;
-/// smooth maps keep their values.
+/// The total light changes by less than 0.2 %, even if one texel has most of it; a constant map stays constant; smooth
+/// maps keep their values.
 TEST(EqualArea, LatitudeAndLongitudeKeepTheLight) {
   for (const float sun : {0.0f, 1000.0f}) {
     const TexelImage square = image(32, sun);

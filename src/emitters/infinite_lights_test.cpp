@@ -38,7 +38,7 @@ void write_exr(const std::string& path, const nlohmann::json& image) {
   ASSERT_TRUE(output->close());
 }
 
-/// The sun's map of environment_image_test in small, as a file.
+/// A small version of the sun map in environment_image_test, as a file.
 std::shared_ptr<Emitter> sun(const TemporaryFolder& folder) {
   nlohmann::json image = {{"width", 12}, {"height", 7}, {"pixels", std::vector<float>(12 * 7 * 3, 0.3f)}};
   for (int c = 0; c < 3; ++c) image["pixels"][3 * (12 * 2 + 5) + c] = 200.0f + 100 * c;
@@ -58,14 +58,14 @@ void expect_rays_cover_the_scene(const Emitter& emitter) {
     EXPECT_NEAR(dot(offset, s.ray.d), -radius, 1e-4 * radius);
     EXPECT_NEAR(s.pdf_position, 1 / (M_PI * radius * radius), 1e-6);
     const Vec3 local = Frame(s.ray.d).to_local(offset) * static_cast<float>(1 / radius);
-    // Area-preserving map of the disk to the unit square.
+    // Area-preserving map from the disk to the unit square.
     const float phi = std::atan2(local.y, local.x) / kTwoPi;
     return Vec2{std::min(local.x * local.x + local.y * local.y, kOneMinusEpsilon),
                 std::min(phi < 0 ? phi + 1 : phi, kOneMinusEpsilon)};
   };
   const auto result = statistics::chi2_square(on_disk, [](const Vec2&) { return 1.0; }, {.name = "disk"});
   EXPECT_TRUE(result.accepted) << result.message;
-  const auto wrong = statistics::chi2_square(  // planted: radius taken uniformly instead of its square
+  const auto wrong = statistics::chi2_square(  // planted: radius uniform instead of its square
       [&](const PathRandom& random) -> std::optional<Vec2> {
         const Vec2 uv = *on_disk(random);
         return Vec2{std::sqrt(uv.x), uv.y};
@@ -136,7 +136,7 @@ TEST(EnvironmentMap, AgreesWithMitsuba) {
     for (size_t i = 0; i < all["directions"].size(); ++i) {
       const Vec3 d = vector(all["directions"][i]);
       const Spectrum value = made.object->environment(d).radiance;
-      // Mitsuba's arc cosine loses digits near the poles: 3e-4 rad, times rows and values up to 15.
+      // Mitsuba's acos is imprecise near the poles: 3e-4 rad, times rows and values up to 15.
       const double tolerance = std::abs(d.y) > 0.999f ? 3e-2 : 2e-4;
       for (int c = 0; c < 3; ++c)
         EXPECT_NEAR(value[c], expected["radiance"][i][c].get<double>(), tolerance)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points that cover the unit cube evenly, for integrals over lights.
+// Low-discrepancy points in the unit cube, for quadrature over lights.
 #pragma once
 
 #include <cmath>

@@ -101,12 +101,12 @@ class Spot : public testing::TestWithParam<int> {
 TEST_P(Spot, AgreesWithMitsuba) { expect_towards(*light_, references()["spot"][GetParam()]["towards"]); }
 
 TEST_P(Spot, EmitsItsPowerInTheCone) {
-  // The textured one sums a coarse grid: 0.5 % covers its error.
+  // Power of the textured light is a sum over a coarse grid, with an error below 0.5 %.
   const double power = luminance(light_->power());
   const bool textured = references()["spot"][GetParam()]["textured"].get<bool>();
   const auto estimate = [&](const PathRandom& r) { return power_estimate(*light_, false, r); };
   EXPECT_TRUE(mean_test(estimate, power, 200000, textured ? 5e-3 * power : 0).accepted);
-  // Without a texture and with a beam narrower than the cone the estimate varies: a 2 % error must show.
+  // Without a texture, and with a beam narrower than the cone, the estimate varies: a 2 % error must be detected.
   EXPECT_FALSE(
       mean_test([&](const PathRandom& r) { return 1.02 * estimate(r); }, power, 200000, textured ? 5e-3 * power : 0)
           .accepted);
@@ -114,7 +114,7 @@ TEST_P(Spot, EmitsItsPowerInTheCone) {
   const double cosine = std::cos(cutoff_ * M_PI / 180);
   const auto sampler = [&](const PathRandom& r) -> std::optional<Vec3> { return draw_emission(*light_, r).ray.d; };
   const auto pdf = [&](const Vec3& d) { return dot(d, axis) > cosine ? 1 / (2 * M_PI * (1 - cosine)) : 0; };
-  // The density jumps at the edge of the cone, which the quadrature of the test resolves to 1 %.
+  // The density jumps at the edge of the cone, which the test's quadrature resolves to 1 %.
   const auto result = statistics::chi2_sphere(sampler, pdf, {.name = "spot", .mass_tolerance = 1e-2});
   EXPECT_TRUE(result.accepted) << result.message;
   EXPECT_NEAR(draw_emission(*light_, PathRandom(Sampling::kIndependent, 1, 0, 0, 0)).pdf_direction, pdf(axis),

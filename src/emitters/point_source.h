@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What lights without extent have in common.
+// Shared by lights without extent.
 #pragma once
 
 #include <cmath>
@@ -11,12 +11,12 @@
 
 namespace covary {
 
-/// Where such a light stands and how it is turned.
+/// Position and orientation of such a light.
 struct PointFrame {
   Vec3 position;
   Rotation rotation;
 };
-/// By `to_world`; records an error where that would distort directions.
+/// From `to_world`; records an error if it would distort directions.
 inline PointFrame get_point_frame(Parameters& parameters) {
   const Transform to_world = parameters.get_transform("to_world");
   PointFrame frame{to_world.point({0, 0, 0}), {}};
@@ -28,7 +28,7 @@ inline PointFrame get_point_frame(Parameters& parameters) {
   return frame;
 }
 
-/// Emitter::sample_towards() of a light at `position`; intensity(d): its power per unit solid angle in direction d.
+/// Emitter::sample_towards() for a light at `position`; intensity(d) is its power per unit solid angle in direction d.
 template <typename Intensity>
 EmitterSample sample_point(const Vec3& position, const Vec3& reference, const Intensity& intensity) {
   EmitterSample sample;
@@ -44,7 +44,7 @@ EmitterSample sample_point(const Vec3& position, const Vec3& reference, const In
   return sample;
 }
 
-/// Emitter::sample_emission() of such a light. `pdf`: of the direction, per unit solid angle.
+/// Emitter::sample_emission() for such a light. `pdf`: of the direction, per unit solid angle.
 inline EmissionSample emit_from_point(const Vec3& position, const Vec3& direction, const Spectrum& intensity,
                                       float pdf) {
   EmissionSample sample;
@@ -57,8 +57,8 @@ inline EmissionSample emit_from_point(const Vec3& position, const Vec3& directio
   return sample;
 }
 
-/// Mean of value(position, density) over positions of a texture that it chooses by its luminance, so that a few bright
-/// texels are found: an integral over its unit square, where `value` divides by the density.
+/// Integral over a texture's unit square by importance sampling of its luminance, so that a few bright texels are not
+/// missed: mean of value(position, density), where `value` divides by the density.
 template <typename Value>
 Spectrum mean_over_texture(const Texture& texture, const Value& value) {
   constexpr int kPoints = 1 << 14;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `projector`: the reverse of a pinhole camera. From one point it throws a picture, whose irradiance on a plane across
-// its axis is that of the texture, times pi, at distance 1: with it the radiance of a white diffuse plane there is the
-// texture's.
+// `projector`: the inverse of a pinhole camera. Projects an image from a point; on a plane perpendicular to the axis at
+// distance 1, the irradiance is pi times the texture, so that a white diffuse plane there has the texture's radiance.
 //
 // | parameter    | type      | default  | meaning                                                                  |
 // |--------------|-----------|----------|--------------------------------------------------------------------------|
@@ -34,7 +33,7 @@ class Projector final : public Emitter {
                         [&](const Vec3& d) { return intensity(frame_.rotation.to_local(d)); });
   }
 
-  /// Positions in the picture by its luminance.
+  /// Samples positions in the image by luminance.
   EmissionSample sample_emission(Vec2, Vec2 u_direction, float) const override {
     const Texture::PositionSample at = irradiance_->sample_position(u_direction);
     if (!(at.pdf > 0)) return {};
@@ -49,7 +48,7 @@ class Projector final : public Emitter {
     return {1, find(local, uv) ? irradiance_->pdf_position(uv) * per_solid_angle(local.z) : 0};
   }
 
-  /// Of an intensity pi E / cos^3 the integral over directions is pi times that of E over the picture at distance 1.
+  /// The intensity is pi E / cos^3; its integral over directions is pi times that of E over the image at distance 1.
   Spectrum power() const override {
     const float area = kPi * scale_ * 4 * tan_x_ * tan_y_;
     SurfaceHit hit;
@@ -65,13 +64,13 @@ class Projector final : public Emitter {
 
  private:
   Vec3 direction(Vec2 uv) const { return normalize(Vec3{(1 - 2 * uv.x) * tan_x_, (1 - 2 * uv.y) * tan_y_, 1}); }
-  /// The point of the picture in the unit direction `local`; false: it is outside.
+  /// Image position in the unit direction `local`; false if outside.
   bool find(const Vec3& local, Vec2& uv) const {
     if (!(local.z > 0)) return false;
     uv = {0.5f * (1 - local.x / (local.z * tan_x_)), 0.5f * (1 - local.y / (local.z * tan_y_))};
     return uv.x >= 0 && uv.x <= 1 && uv.y >= 0 && uv.y <= 1;
   }
-  /// Density per unit solid angle of what has density 1 in the picture's unit square.
+  /// Density per unit solid angle of a unit density on the image's unit square.
   float per_solid_angle(float cosine) const { return 1 / (4 * tan_x_ * tan_y_ * cosine * cosine * cosine); }
   /// Power per unit solid angle.
   Spectrum intensity_at(Vec2 uv, float cosine) const {
@@ -86,7 +85,7 @@ class Projector final : public Emitter {
 
   PointFrame frame_;
   TexturePtr irradiance_;
-  float scale_, tan_x_, tan_y_;  // tan: half extents of the picture at distance 1
+  float scale_, tan_x_, tan_y_;  // tan: half extents of the image at distance 1
 };
 
 }  // namespace

@@ -21,7 +21,7 @@ TEST(Projector, LightsAPlaneEvenly) {
   for (const Vec2 at : {Vec2{0, 0}, Vec2{1.5f, -0.5f}, Vec2{-1.9f, 1.9f}}) {
     const EmitterSample s = made.object->sample_towards({at.x, at.y, 2}, {}, 0);
     EXPECT_TRUE(s.is_delta);
-    // Irradiance of the plane z = 2: pi times that of the picture at distance 1, over 2 squared.
+    // Irradiance on the plane z = 2: pi times the image at distance 1, over 2 squared.
     EXPECT_NEAR(s.radiance.g * -s.wi.z, kPi * 2 * 2 / 4, 1e-4f);
   }
   EXPECT_EQ(made.object->sample_towards({2.1f, 0, 2}, {}, 0).radiance, Spectrum(0));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The emitters by the name scene files use; each plugin's file documents its parameters. A new emitter: a word in
+// Emitters by the names used in scene files; each plugin's file documents its parameters. To add one: a line in
 // registry.cpp, a file in CMake.
 #pragma once
 
@@ -10,7 +10,7 @@
 
 namespace covary {
 
-/// All of a kind, sorted by name.
+/// All plugins of a kind, sorted by name.
 std::span<const Plugin<Emitter>> emitter_plugins();
 
 }  // namespace covary

@@ -14,7 +14,7 @@ Rotation::Rotation(const Transform& t) : x_(t.vector({1, 0, 0})), y_(t.vector({0
     throw Error(ErrorCode::kInput,
                 "distorts directions; only rotations, reflections, translations and uniform scales "
                 "are accepted here");
-  // Files give matrices with few digits: make the axes orthonormal, so that densities stay right.
+  // Matrices in files have few digits: orthonormalise, so that densities stay correct.
   x_ = normalize(x_);
   y_ = normalize(y_ - x_ * dot(x_, y_));
   const Vec3 z = cross(x_, y_);

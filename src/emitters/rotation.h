@@ -5,12 +5,12 @@
 
 namespace covary {
 
-/// Rotation or reflection of directions: what `to_world` does to a light that has no size. Keeps lengths.
+/// Rotation or reflection of directions: the effect of `to_world` on a light without extent. Preserves lengths.
 class Rotation {
  public:
   Rotation() = default;
-  /// The linear part of `t` without its uniform scale. Throws Error(kInput) when it is not a similarity, because
-  /// directions would then be distorted.
+  /// The linear part of `t` without its uniform scale. Throws Error(kInput) if it is not a similarity, which would
+  /// distort directions.
   explicit Rotation(const Transform& t);
   Vec3 to_world(const Vec3& v) const { return x_ * v.x + y_ * v.y + z_ * v.z; }
   Vec3 to_local(const Vec3& v) const { return {dot(x_, v), dot(y_, v), dot(z_, v)}; }

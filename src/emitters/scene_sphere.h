@@ -8,7 +8,7 @@
 
 namespace covary {
 
-/// Bounding sphere of the scene, for lights infinitely far away. The unit sphere until bounds are known.
+/// Bounding sphere of the scene, for lights at infinity. The unit sphere until bounds are set.
 struct SceneSphere {
   Vec3 center;
   float radius = 1;
@@ -19,14 +19,14 @@ struct SceneSphere {
   }
 
   float disk_area() const { return kPi * radius * radius; }
-  /// Origin of a ray in direction `d` into the scene, uniform on the disk perpendicular to `d` that touches the sphere
-  /// from outside and covers it; density 1 / disk_area() per unit area of the disk.
+  /// Origin of a ray into the scene in direction `d`, uniform on the disk perpendicular to `d` that is tangent to the
+  /// sphere and covers it; density 1 / disk_area() per unit area.
   Vec3 disk_point(const Vec3& d, Vec2 u) const {
     const Frame frame(d);
     const Vec2 offset = warp::square_to_disk(u);
     return center + (frame.s * offset.x + frame.t * offset.y - d) * radius;
   }
-  /// Light that enters the scene in direction `d`, which has the density `pdf_direction` per unit solid angle.
+  /// Emission into the scene in direction `d`, whose density per unit solid angle is `pdf_direction`.
   EmissionSample emission(const Vec3& d, Vec2 u, const Spectrum& radiance, float pdf_direction) const {
     EmissionSample sample;
     sample.ray = {disk_point(d, u), d};

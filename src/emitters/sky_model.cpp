@@ -34,13 +34,12 @@ const Coefficients& coefficients() {
   return read;
 }
 
-/// Y of a spectrum that is 1 everywhere is 1.
+/// Normalises Y of the constant spectrum 1 to 1.
 constexpr double kNormalisationY = 1 / 106.7502593994140625;
-/// The sun's spectra are in another unit than the sky's colours.
+/// Conversion between the units of the sun's spectra and of the sky's colours.
 constexpr double kSunScale = 467.069280386;
 
-/// Linear Rec. 709 RGB that light of 320, 360, … 720 nm adds: the CIE 1931 observer's response, divided by their
-/// number.
+/// Linear Rec. 709 RGB contribution of the wavelengths 320, 360, … 720 nm: CIE 1931 response divided by their number.
 constexpr double kColours[kWavelengths][3] = {
     {0, 0, 0},
     {1.02504675e-05, -8.48827328e-06, 5.88423305e-05},
@@ -55,7 +54,7 @@ constexpr double kColours[kWavelengths][3] = {
     {0.00070780111, -7.69115922e-05, -4.75375201e-06},
 };
 
-/// Linear between the whole turbidities 1 to 10.
+/// Linear interpolation between integer turbidities 1 to 10.
 struct TurbidityPlace {
   int low;
   double weight;  // of low + 1
@@ -69,12 +68,12 @@ Spectrum not_negative(const double (&rgb)[3], double scale) {
   return result;
 }
 
-/// Radiance of the disk where it stands at `elevation` (radians), in the direction that makes the angle psi with the
-/// sun's radius there; as Mitsuba has it in RGB, in W / (m² sr nm), possibly negative.
+/// Radiance of the sun's disk where its elevation is `elevation` (radians), at angle psi from its centre; in RGB as in
+/// Mitsuba, W / (m² sr nm), possibly negative.
 void sun_radiance(float turbidity, double elevation, double cos_psi, double (&rgb)[3]) {
   const Coefficients& data = coefficients();
   const TurbidityPlace t(turbidity);
-  // [HosekWilkie2013]: segments of equal length in the cube root of the elevation, a cubic polynomial in each.
+  // [HosekWilkie2013]: segments of equal length in the cube root of elevation, each a cubic polynomial.
   const int segment = std::clamp(static_cast<int>(std::cbrt(2 * elevation / kPiD) * kSegments), 0, kSegments - 1);
   const double x = elevation - kPiD / 2 * std::pow(static_cast<double>(segment) / kSegments, 3);
   for (double& channel : rgb) channel = 0;
@@ -88,7 +87,7 @@ void sun_radiance(float turbidity, double elevation, double cos_psi, double (&rg
   }
 }
 
-/// Mean radiance of the disk that stands at `elevation`, which lies above the horizon.
+/// Mean radiance over a disk at `elevation`, above the horizon.
 std::array<double, 3> mean_over_disk(float turbidity, double elevation) {
   constexpr int kRings = 64, kTurns = 32;
   const double cap = 1 - std::cos(kSunHalfAngle);
@@ -112,7 +111,7 @@ std::array<double, 3> mean_over_disk(float turbidity, double elevation) {
 SkyModel::SkyModel(float turbidity, const Spectrum& albedo, const Vec3& sun) : sun_(sun) {
   const Coefficients& data = coefficients();
   const TurbidityPlace t(turbidity);
-  // [HosekWilkie2012]: a quintic Bézier curve over the cube root of the sun's elevation.
+  // [HosekWilkie2012]: a quintic Bézier curve in the cube root of the sun's elevation.
   const double elevation = std::asin(std::clamp(sun.z, 0.0f, 1.0f));
   const double x = std::min(std::cbrt(2 * elevation / kPiD), 1.0);
   constexpr double kBinomials[kControls] = {1, 5, 10, 10, 5, 1};
@@ -140,8 +139,8 @@ Spectrum SkyModel::radiance(const Vec3& w) const {
   const float cosine = dot(w, sun_), cos2 = cosine * cosine;
   Spectrum result;
   for (int channel = 0; channel < 3; ++channel) {
-    const auto& [a, b, c, d, e, f, g, i, h, mean] = channels_[channel];  // in the order of the data
-    // [HosekWilkie2012], the extended formula of Perez
+    const auto& [a, b, c, d, e, f, g, i, h, mean] = channels_[channel];  // order of the data
+    // [HosekWilkie2012], extended Perez formula.
     const float chi = (1 + cos2) / std::pow(1 + h * h - 2 * h * cosine, 1.5f);
     const float value = (1 + a * std::exp(b / (w.z + 0.01f))) *
                         (c + d * std::exp(e * gamma) + f * cos2 + g * chi + i * std::sqrt(w.z)) * mean;
@@ -158,7 +157,7 @@ SunModel::SunModel(float turbidity, const Vec3& sun, float half_angle, bool limb
       sin2_(sqr(std::sin(static_cast<double>(half_angle)))),
       spread_((1 - std::cos(kSunHalfAngle)) / one_minus_cos_ * kSunScale * kNormalisationY),
       limb_darkening_(limb_darkening) {
-  // As Mitsuba tabulates it: linear between elevations of 2, 5, … 89 degrees, and constant beyond.
+  // As tabulated by Mitsuba: linear between elevations of 2, 5, … 89 degrees, constant beyond.
   const double degrees = std::asin(std::clamp(sun.z, 0.0f, 1.0f)) * 180 / kPiD;
   const double place = std::clamp((degrees - 2) / 3, 0.0, 29.0);
   const int low = std::min(static_cast<int>(place), 28);
@@ -182,12 +181,12 @@ Spectrum SunModel::radiance(const Vec3& w) const {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-/// Radius of the Earth over the distance of the sun.
+/// Earth's radius over the distance of the sun.
 constexpr double kParallax = 6371.01 / 149597890;
 
-/// Days from noon of 1 January 2000 to the beginning of a day.
+/// Days from noon of 1 January 2000 to the start of the day.
 double days_since_2000(int year, int month, int day) {
-  // Fliegel and Van Flandern 1968, whose divisions round towards zero.
+  // Fliegel and Van Flandern 1968; divisions truncate towards zero.
   const int january = (month - 14) / 12;
   const int julian = 1461 * (year + 4800 + january) / 4 + 367 * (month - 2 - 12 * january) / 12 -
                      3 * ((year + 4900 + january) / 100) / 4 + day - 32075;
@@ -200,7 +199,7 @@ Vec3 sun_position(const SunTime& time) {
   const double hours = time.hour - time.timezone + (time.minute + time.second / 60) / 60;
   const double days = days_since_2000(time.year, time.month, time.day) + hours / 24;
 
-  // [BlancoMuriel2001]: where the sun stands before the stars,
+  // [BlancoMuriel2001]: the sun's position relative to the stars,
   const double omega = 2.1429 - 0.0010394594 * days;
   const double longitude = 4.8950630 + 0.017202791698 * days, anomaly = 6.2400600 + 0.0172019699 * days;
   const double ecliptic = longitude + 0.03341607 * std::sin(anomaly) + 0.00034894 * std::sin(2 * anomaly) - 0.0001134 -
@@ -209,7 +208,7 @@ Vec3 sun_position(const SunTime& time) {
   const double ascension = std::atan2(std::cos(obliquity) * std::sin(ecliptic), std::cos(ecliptic));
   const double declination = std::asin(std::sin(obliquity) * std::sin(ecliptic));
 
-  // and how the Earth has turned.
+  // and the Earth's rotation.
   const double sidereal = ((6.6974243242 + 0.0657098283 * days + hours) * 15 + time.longitude) * kDegree;
   const double turn = sidereal - ascension, latitude = time.latitude * kDegree;
   const double zenith = std::acos(std::cos(latitude) * std::cos(turn) * std::cos(declination) +

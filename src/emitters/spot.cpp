@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// `spot`: light from one point into a cone around the z axis. The intensity is constant up to beam_width and falls
+// `spot`: a point light restricted to a cone around the z axis. The intensity is constant up to beam_width and falls
 // linearly in the angle to zero at cutoff_angle.
 //
 // | parameter    | type      | default          | meaning                                                       |
 // |--------------|-----------|------------------|---------------------------------------------------------------|
-// | intensity    | colour    | 1                | power per unit solid angle in the middle                      |
+// | intensity    | colour    | 1                | power per unit solid angle at the centre                      |
 // | cutoff_angle | float     | 20               | half angle of the cone in degrees, in (0, 180)                |
 // | beam_width   | float     | 0.75 * cutoff    | half angle of full intensity in degrees, up to cutoff_angle   |
 // | texture      | texture   | none             | projected factor; its unit square spans the cone (cutoff < 90) |
@@ -86,7 +86,7 @@ class SpotLight final : public Emitter {
 
   PointFrame frame_;
   Spectrum intensity_;
-  TexturePtr texture_;         // or null
+  TexturePtr texture_;         // may be null
   float cutoff_, beam_width_;  // radians, 0 <= beam_width <= cutoff
   float cos_cutoff_, cos_beam_, one_minus_cos_cutoff_;
 };

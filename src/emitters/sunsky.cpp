@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// sunsky: a clear sky and the sun in it, from a model (sky_model.h). z is up; below the horizon all is black, and at
-// night everywhere.
+// sunsky: a clear sky and the sun, from a model (sky_model.h). z is up; black below the horizon, and everywhere at
+// night.
 //
 // | parameter            | type      | default        | meaning                                                       |
 // |----------------------|-----------|----------------|---------------------------------------------------------------|
 // | turbidity            | float     | 3              | haze, from 1, very clear, to 10                               |
 // | albedo               | colour    | 0.3            | of the ground, which shines back on the sky                   |
-// | sun_direction        | vector    |                | from the ground to the sun, in the world; instead of the time |
-// | latitude, longitude  | float     | 35.6894,       | degrees to the north and to the east: Tokyo                   |
+// | sun_direction        | vector    |                | towards the sun, in world space; instead of place and time    |
+// | latitude, longitude  | float     | 35.6894,       | degrees north and east: Tokyo                                 |
 // |                      |           | 139.6917       |                                                               |
-// | timezone             | float     | 9              | hours ahead of universal time                                 |
+// | timezone             | float     | 9              | hours ahead of UTC                                            |
 // | year, month, day     | integer   | 2010, 7, 10    |                                                               |
-// | hour, minute, second | float     | 15, 0, 0       | clock of the time zone                                        |
-// | sun_scale, sky_scale | float     | 1              | factors; 0 takes away the sun or the sky                      |
-// | sun_aperture         | float     | 0.5358         | degrees across the sun's disk, which keeps its light          |
-// | complex_sun          | boolean   | false          | limb darkening: the disk is brighter in its middle            |
+// | hour, minute, second | float     | 15, 0, 0       | local time                                                    |
+// | sun_scale, sky_scale | float     | 1              | factors; 0 removes the sun or the sky                         |
+// | sun_aperture         | float     | 0.5358         | angular diameter in degrees; does not change its irradiance   |
+// | complex_sun          | boolean   | false          | limb darkening: the disk is brighter at its centre            |
 // | to_world             | transform | identity       | rotation                                                      |
 //
-// Sampling: the sun's cone evenly, or the sky by a table of its luminance, in proportion to what they shine.
+// Sampling: the sun's cone uniformly, or the sky by a table of its luminance, chosen in proportion to their power.
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -33,7 +33,7 @@
 namespace covary {
 namespace {
 
-/// The light in the frame of the sky; large, and shared by copies.
+/// The light in the local frame of the sky; large, shared by copies.
 class Dome {
  public:
   Dome(const std::optional<SkyModel>& sky, float sky_scale, const std::optional<SunModel>& sun, float sun_scale,
@@ -69,15 +69,15 @@ class Dome {
     return {r * phi.cos, r * phi.sin, z};
   }
 
-  /// Of the radiance over all directions.
+  /// Integral of radiance over all directions.
   const Spectrum& integral() const { return integral_; }
 
  private:
-  /// Cells of equal solid angle: turns around z, and z.
+  /// Cells of equal solid angle: azimuth and z.
   static constexpr int kWidth = 256, kHeight = 128;
   static Vec2 to_square(const Vec3& w) { return {angle_turns(w.y, w.x), std::min(w.z, kOneMinusEpsilon)}; }
 
-  /// The table for sampling; returns the sky's integral, by four points in each cell.
+  /// Builds the sampling table; returns the sky's integral, from four points per cell.
   Spectrum tabulate_sky() {
     if (!sky_) return Spectrum(0);
     std::vector<float> weights;
@@ -100,7 +100,7 @@ class Dome {
       sky_.reset();
       return Spectrum(0);
     }
-    // Where the points of a cell are black, others may shine.
+    // Where the points of a cell are black, others may not be: a minimum weight.
     const auto least = static_cast<float>(1e-3 * sum / (kWidth * kHeight));
     for (float& weight : weights) weight = std::max(weight, least);
     table_ = PiecewiseConstant2D(weights, kWidth, kHeight);

@@ -48,7 +48,7 @@ Transform rotation() {
   return Transform::rotate(vector(r["axis"]), r["angle"].get<double>());
 }
 
-/// The light of an entry of references()["skies"], or its sky alone.
+/// The light of an entry of references()["skies"], or only its sky.
 std::shared_ptr<const Emitter> sky(nlohmann::json entry, bool alone = false) {
   if (alone) entry["parameters"]["sun_scale"] = 0.0;
   NamedValues values = values_of(entry["parameters"]);
@@ -59,8 +59,8 @@ std::shared_ptr<const Emitter> sky(nlohmann::json entry, bool alone = false) {
   return made.object->in_scene({{-1, -2, -3}, {3, 2, 1}});
 }
 
-/// The largest error, relative to the value and to 0.01, over an entry's directions. Where the sun is negative in a
-/// channel, what is left is the sky: less than 0.2.
+/// The largest error, relative to value + 0.01, over an entry's directions. Where a channel of the sun is negative,
+/// only the sky remains: less than 0.2.
 double largest_error(const nlohmann::json& entry, float scale = 1) {
   const auto light = sky(entry);
   double largest = 0;
@@ -80,14 +80,14 @@ double largest_error(const nlohmann::json& entry, float scale = 1) {
 TEST(SunSky, AgreesWithMitsuba) {
   ASSERT_EQ(references()["skies"].size(), 6u);
   for (const auto& entry : references()["skies"]) {
-    // The solid angle of the sun, 1 - cos, is up to 0.3 % off in Mitsuba's single precision.
+    // In Mitsuba's single precision the solid angle of the sun, 1 - cos, is up to 0.3 % off.
     const bool sun = !entry["parameters"].contains("albedo");
     EXPECT_LT(largest_error(entry), sun ? 5e-3 : 5e-4) << entry["parameters"];
     EXPECT_GT(largest_error(entry, 1.02f), 0.01) << entry["parameters"];  // planted
   }
 }
 
-/// Mitsuba counts days in single precision, a quarter of a day at a time, which moves the sun by up to 0.2 degrees.
+/// Mitsuba counts days in single precision, in steps of a quarter of a day, which moves the sun by up to 0.2 degrees.
 TEST(SunPosition, AgreesWithMitsubaWithinItsPrecision) {
   for (const auto& entry : references()["suns"]) {
     const auto& p = entry["parameters"];
@@ -106,8 +106,8 @@ TEST(SunPosition, AgreesWithMitsubaWithinItsPrecision) {
   }
 }
 
-/// By the almanac: at the equinox of 20 March 2000, 07:35 UT, the sun passes the equator; at the longitude where it is
-/// noon (07:35 + 4.43 h, less the equation of time of 7.5 minutes) it stands in the zenith.
+/// Almanac: at the equinox of 20 March 2000, 07:35 UT, the sun crosses the equator; at the longitude where it is noon
+/// (07:35 + 4.43 h, minus the equation of time of 7.5 minutes) it is at the zenith.
 TEST(SunPosition, StandsInTheZenithAtTheEquinox) {
   const double noon = (12 - (7 + 35.0 / 60)) * 15 + 7.4 / 60 * 15;
   const Vec3 sun = sun_position({.latitude = 0,
@@ -143,8 +143,8 @@ TEST(SunSky, SamplesWhatItClaims) {
   }
 }
 
-/// The sun's part of the density: samples hit the disk as often as it says. N = 200 000, alpha = 5e-7 (five standard
-/// deviations); finds 2 % of a probability of a half with power 0.99.
+/// The sun's part of the density: samples hit the disk with the claimed probability. N = 200 000, alpha = 5e-7 (five
+/// standard deviations); detects 2 % of a probability of a half with power 0.99.
 TEST(SunSky, SamplesTheSunAsOftenAsItClaims) {
   const auto& entry = references()["skies"][1];
   const auto light = sky(entry);
@@ -161,7 +161,8 @@ TEST(SunSky, SamplesTheSunAsOftenAsItClaims) {
   EXPECT_FALSE(mean_test(in_sun, 1.03 * claimed, 200000, 1e-3 * claimed).accepted);
 }
 
-/// Irradiance by samples against a quadrature of the sky alone, and power() against samples, with a planted 2 %.
+/// Irradiance by sampling against quadrature of the sky alone, and power() against sampling, with a planted error of 2
+/// %.
 TEST(SunSky, WeightsAndPowerAreRight) {
   const auto clear = sky(references()["skies"][5]);
   const Vec3 n = normalize(Vec3{1, 1, 1});
@@ -181,7 +182,7 @@ TEST(SunSky, WeightsAndPowerAreRight) {
   }
 }
 
-/// The sun's irradiance does not depend on how wide its disk is.
+/// The sun's irradiance is independent of the width of its disk.
 TEST(SunSky, ApertureKeepsTheSunsLight) {
   const auto power = [](double aperture) {
     const auto made = make({{"sky_scale", 0.0}, {"sun_aperture", aperture}, {"sun_direction", Vec3{0, 0.6f, 0.8f}}});
