@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes that move are, at each time, the scenes in which all rests where it is then.
+// At each time, an animated scene equals the static scene with everything placed as at that time.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ std::string key(double time) {
                      time, 40 * time, 0.75 * time - 1);
 }
 
-/// The scene of these shapes, each of which has "TO_WORLD" where it moves: by the animation, or resting at a key.
+/// A scene of these shapes; "TO_WORLD" in moving ones is replaced by the animation, or by one of its keys.
 LoadedScene scene_of(std::string shapes, const std::string& to_world) {
   for (size_t at; (at = shapes.find("TO_WORLD")) != std::string::npos;) shapes.replace(at, 8, to_world);
   return load_scene_text(
@@ -43,7 +43,7 @@ LoadedScene resting(const std::string& shapes, double time) {
   return scene_of(shapes, rests);
 }
 
-/// How many of 2,000 rays through the middle hit something; each must hit the same in both.
+/// Number of 2,000 rays through the middle that hit something; each must hit the same in both.
 int n_same_hits(const LoadedScene& a, const LoadedScene& b) {
   int n = 0;
   for (int i = 0; i < 2000; ++i) {
@@ -82,7 +82,7 @@ TEST(Animation, PlacesEachShapeWhereItIs) {
         R"(<shape type="cube"><transform name="to_world"><translate z="-2"/></transform></shape>)" + shape +
         R"(<emitter type="constant"/>)";
     const LoadedScene scene = moving(shapes);
-    for (const double time : {0.0, 3.0, 1.0}) {  // to and fro
+    for (const double time : {0.0, 3.0, 1.0}) {  // back and forth
       scene.scene->move_to(time);
       const LoadedScene alone = resting(shapes, time);
       EXPECT_GT(n_same_hits(scene, alone), 500) << shape << time;

@@ -19,21 +19,21 @@ namespace covary {
 namespace fs = std::filesystem;
 namespace {
 
-/// Comments of XML hold no "--".
+/// XML comments must not contain "--".
 std::string comment_on(const std::string& path) {
   std::string name = fs::path(path).filename().string();
   for (size_t i; (i = name.find("--")) != std::string::npos;) name.replace(i, 2, "- -");
   return fmt::format(" Made by covary of '{}' ", name);
 }
 
-/// `file` as seen from `folder`.
+/// Path of `file` relative to `folder`.
 std::string relative_name(const fs::path& file, const fs::path& folder) {
   std::error_code failed;
   const fs::path relative = fs::relative(file, folder.empty() ? "." : folder, failed);
   return failed || relative.empty() ? fs::absolute(file).string() : relative.string();
 }
 
-/// What Mitsuba 3 has no plugin for.
+/// Warns about plugins that Mitsuba 3 does not have.
 void warn_of_own_plugins(const ObjectDescription& scene, std::vector<std::string>& warnings) {
   std::set<std::string> told;
   visit_properties(scene, [&](const ObjectDescription&, const Property& property) {
@@ -67,8 +67,8 @@ std::string pfm_text(const TexelImage& image) {
   return text;
 }
 
-/// Images that were part of the scene's file in formats that Mitsuba reads: colours of bytes as PNG, grey ones, which
-/// are linear, as PFM.
+/// Re-encodes images embedded in the scene's file in formats that Mitsuba reads: 8-bit colours as PNG; grey, which is
+/// linear, as PFM.
 std::optional<RecodedFile> recode(std::string_view bytes) {
   if (!bytes.starts_with("P5") && !bytes.starts_with("P6")) return std::nullopt;
   TexelImage image = read_embedded_image(bytes);
@@ -80,7 +80,7 @@ std::optional<RecodedFile> recode(std::string_view bytes) {
   return RecodedFile{pfm_text(image), ".pfm"};
 }
 
-/// An environment of pbrt in the mapping that Mitsuba has.
+/// Resamples a pbrt environment map to Mitsuba's mapping.
 ObjectPtr in_latitude_longitude(const ObjectDescription& emitter, const FindFile& find_file) {
   auto changed = std::make_shared<ObjectDescription>(emitter);
   std::erase_if(changed->properties, [](const Property& p) { return p.name == "mapping"; });
@@ -93,7 +93,7 @@ ObjectPtr in_latitude_longitude(const ObjectDescription& emitter, const FindFile
   return changed;
 }
 
-/// The scene, with environments in Mitsuba's mapping, and with its path tracer that sees media where there are some.
+/// The scene with environments in Mitsuba's mapping and, if it has media, Mitsuba's volumetric path tracer.
 std::shared_ptr<const ObjectDescription> for_mitsuba(const ObjectDescription& scene, const FindFile& find_file,
                                                      std::vector<std::string>& warnings) {
   auto changed = std::make_shared<ObjectDescription>(scene);

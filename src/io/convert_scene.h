@@ -13,14 +13,14 @@ namespace covary {
 
 struct ConvertedScene {
   SceneDocument document;
-  std::vector<std::string> files;  ///< paths of all files that the scene reads, including its own
+  std::vector<std::string> files;  ///< paths of all files that the scene reads, its own included
   std::vector<std::string> warnings;
-  std::shared_ptr<const ObjectDescription> description;  ///< holds the bytes of the document's files
+  std::shared_ptr<const ObjectDescription> description;  ///< owns the bytes of the document's files
 };
 
-/// The scene `path` as Mitsuba XML with the name `output`: files that it names are relative to that file's folder, and
-/// data from inside its own file goes to a folder beside it, "NAME-files". The scene is loaded first, so that only
-/// scenes that can be rendered are converted: throws like load_scene().
+/// Converts the scene `path` to Mitsuba XML to be saved as `output`: referenced files are relative to its folder, and
+/// data embedded in the scene's own file goes to a folder next to it, "NAME-files". Loads the scene first, so that only
+/// renderable scenes are converted; throws like load_scene().
 ConvertedScene convert_scene(const std::string& path, const std::string& output, const LoadOptions& options = {});
 
 }  // namespace covary

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of curves, attributes of PLY files, and the shapes made of them.
+// Curve files, attributes of PLY files, and the shapes made from them.
 #include "io/shapes.h"
 
 #include <gtest/gtest.h>
@@ -38,7 +38,7 @@ TEST(CurveFile, NamesLinesThatAreWrong) {
   EXPECT_TRUE(contains(message("\n\n"), "there is no curve"));
 }
 
-/// A straight curve along x of radius 0.5, seen from above: where the tube is, its normal, and its parameters.
+/// A straight curve along x of radius 0.5, seen from above: position, normal and parameters of the tube.
 TEST(Curves, AreRoundTubes) {
   const test_support::TemporaryFolder folder;
   const auto hit_of = [&](const std::string& type, const std::string& points, SurfaceHit& hit, const Vec3& o) {
@@ -60,7 +60,7 @@ TEST(Curves, AreRoundTubes) {
   EXPECT_FALSE(hit_of("bsplinecurve", "0 0 0 0.5\n1 0 0 0.5\n2 0 0 0.5\n3 0 0 0.5\n", hit, {0.5f, 0, 5}));
 }
 
-/// Into the open end of a tube along z: the inside is passed.
+/// A ray into the open end of a tube along z: the inside is not hit.
 TEST(Curves, AreSeenFromOutsideAlone) {
   const test_support::TemporaryFolder folder;
   write(folder.file("c.txt"), "0 0 0 0.5\n0 0 1 0.5\n0 0 2 0.5\n0 0 3 0.5\n");
@@ -88,7 +88,7 @@ MeshFile ply(const std::string& text, const std::vector<std::string>& wanted) {
   return read_ply(std::as_bytes(std::span(text.data(), text.size())), wanted);
 }
 
-/// A square of one polygon, and a triangle.
+/// A square as one polygon, and a triangle.
 const std::string kAttributes =
     "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
     "property float heat_x\nproperty float heat_y\nproperty float heat_z\nproperty uchar weight\n"

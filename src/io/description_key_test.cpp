@@ -47,7 +47,7 @@ TEST(DescriptionKey, DiffersWhereAnyValueDiffers) {
   other.type = "checkerboard";
   EXPECT_NE(description_key(other), description_key(bitmap({})));
   other = bitmap({});
-  other.where.file = "sub/scene.xml";  // the same name of a file means another file there
+  other.where.file = "sub/scene.xml";  // there, the same relative name means another file
   EXPECT_NE(description_key(other), description_key(bitmap({})));
 }
 

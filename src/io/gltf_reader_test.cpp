@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes of glTF against the same scenes in Mitsuba's XML by hand: rays of the camera, what they meet, its reflection
-// and light. Nothing is statistical.
+// glTF scenes against the same scenes written by hand in Mitsuba XML: camera rays, hits, reflection and light. No
+// statistics.
 #include "gltf/gltf_reader.h"
 
 #include <fmt/format.h>
@@ -25,7 +25,7 @@ using nlohmann::json;
 using test_support::contains;
 using test_support::message_of;
 
-/// A file in the making, with one buffer.
+/// Builder of a file with one buffer.
 struct Gltf {
   json scene = {{"asset", {{"version", "2.0"}}}, {"scene", 0}, {"scenes", {{{"nodes", json::array()}}}}};
   std::string buffer;
@@ -50,7 +50,7 @@ struct Gltf {
                              {"type", type},
                              {"count", values.size() / static_cast<size_t>(width)}});
   }
-  /// A square [-1, 1]^2 in z = 0 with texture coordinates, v downwards as glTF has it; its mesh.
+  /// Adds a square [-1, 1]^2 in z = 0 with texture coordinates, v downwards as in glTF; returns the mesh.
   int add_square(int material, bool normals = false) {
     const int p = add_accessor<float>({-1, -1, 0, 1, -1, 0, -1, 1, 0, 1, 1, 0}, 5126, "VEC3", 3);
     const int uv = add_accessor<float>({0, 1, 1, 1, 0, 0, 1, 0}, 5126, "VEC2", 2);
@@ -98,7 +98,7 @@ class GltfReader : public ::testing::Test {
   test_support::TemporaryFolder folder_;
 };
 
-/// 4 x 2 texels: red and blue grow to the right, green downwards.
+/// 4 x 2 texels: red and blue increase to the right, green downwards.
 std::string picture() {
   std::string rgb;
   for (int i = 0; i < 8; ++i)
@@ -130,7 +130,7 @@ std::string square_ply(bool normals) {
   return text + "3 1 2 0\n3 1 3 2\n";
 }
 
-// A textured square under two nodes, a lamp that is a square, and the three lights.
+// A textured square under two nodes, a square area light, and the three kinds of lights.
 TEST_F(GltfReader, IsTheSceneByHand) {
   Gltf file;
   file.add_camera();
@@ -209,7 +209,7 @@ TEST_F(GltfReader, MaterialsAreThoseByHand) {
 
   write("square.ply", square_ply(true));
   write("picture.png", png());
-  // What the channels of the picture are by themselves; roughness with its factor.
+  // The image's channels as separate textures; roughness with its factor.
   std::string rough = "Pf\n4 2\n-1.0\n", metal = "P5\n4 2\n255\n";
   const std::string rgb = picture();
   for (const int row : {1, 0})
@@ -239,7 +239,7 @@ TEST_F(GltfReader, MaterialsAreThoseByHand) {
   test_support::expect_same_scene(a, b, 100);
 }
 
-/// A converted file is the same scene; its images are in formats that Mitsuba reads.
+/// A converted file is the same scene, with images in formats that Mitsuba reads.
 TEST_F(GltfReader, CanBeConverted) {
   Gltf file;
   file.add_camera();
@@ -258,7 +258,7 @@ TEST_F(GltfReader, CanBeConverted) {
     write(part.path, std::string(part.bytes));
     ++kinds[std::filesystem::path(part.path).extension().string()];
   }
-  // The picture as it is, which colours and normals share; its green and its blue; the mesh.
+  // The original image, shared by colours and normals; its green and its blue channel; the mesh.
   EXPECT_EQ(kinds, (std::map<std::string, int>{{".pfm", 2}, {".ply", 1}, {".png", 1}}));
   test_support::expect_same_scene(a, load_scene(folder_.file("out.xml")), 100);
 }
@@ -270,7 +270,7 @@ TEST_F(GltfReader, MeshesThatAreUsedAgainAreInstances) {
   const int square = file.add_square(material);
   for (const double x : {-0.5, 0.5})
     file.add_root({{"mesh", square}, {"translation", {x, 0, x}}, {"scale", {0.4, 0.4, 0.4}}});
-  // A strip and a fan of the same square.
+  // The same square as a strip and as a fan.
   const int p = file.add_accessor<float>({-1, -1, 0, 1, -1, 0, -1, 1, 0, 1, 1, 0}, 5126, "VEC3", 3);
   const int strip = file.add_accessor<uint8_t>({0, 1, 2, 3}, 5121, "SCALAR", 1);
   const int fan = file.add_accessor<uint32_t>({0, 1, 3, 2}, 5125, "SCALAR", 1);
@@ -362,7 +362,7 @@ TEST_F(GltfReader, WhatIsWrongIsNamed) {
                        "scenes of glTF have no parameters to define"));
 }
 
-/// 2,000 files with a few bytes changed or cut off: each loads, or is refused with a message.
+/// 2,000 files with a few bytes changed or truncated: each loads or is rejected with a message.
 TEST_F(GltfReader, DamagedFilesDoNoHarm) {
   Gltf file;
   file.add_camera();

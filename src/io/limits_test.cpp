@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Small files that stand for very much: each is rejected with a message that tells the limit.
+// Small files that expand to very much: each is rejected with a message stating the limit.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -25,7 +25,7 @@ std::string errors(const std::string& body, const std::string& name = "/no/such/
   return message_of([&] { load_scene_text(scene(kSensor + body), name); });
 }
 
-/// `n` models of the type, each holding the one before `times` times.
+/// `n` models of the type, each holding the previous one `times` times.
 std::string chain(const std::string& type, int n, int times, const std::string& more = "") {
   std::string text = "<bsdf type=\"diffuse\" id=\"b0\"/>\n";
   for (int i = 1; i <= n; ++i) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From a scene file to a Scene: the XML is read, then everything that reads files (textures, environment maps, meshes)
-// is made in parallel, then the rest is put together in file order. Problems are collected throughout and thrown once.
+// From a scene file to a Scene: the XML is read; then everything that reads files (textures, environment maps, meshes)
+// is created in parallel; then the rest is assembled in file order. Problems are collected throughout and thrown once.
 #include "io/load_scene.h"
 
 #include <fmt/format.h>
@@ -61,7 +61,7 @@ class Loader {
                                              [&](const Instance& instance) { return any(instance.group->shapes); });
   }
 
-  // ---- putting it together ----
+  // ---- assembly ----
 
   void assemble() {
     held_ = held_objects(*xml_.scene);
@@ -73,7 +73,7 @@ class Loader {
         place(*pointer);
       }
     }
-    if (!integrator_) {  // as Mitsuba
+    if (!integrator_) {  // as in Mitsuba
       auto description = std::make_shared<ObjectDescription>();
       description->kind = "integrator", description->type = "path", description->where = xml_.scene->where;
       place_integrator(description);
@@ -117,7 +117,7 @@ class Loader {
     } else if (kind == "integrator") {
       place_integrator(object);
     } else if (kind == "bsdf" || kind == "texture" || is_part_of_media(kind)) {
-      factory_.make(object);  // also those nothing uses, so that their mistakes are found
+      factory_.make(object);  // even unused ones, so that their errors are found
     } else if ((kind == "sampler" || kind == "film" || kind == "rfilter") && !object->id.empty()) {
       factory_.make(object);
       if (!held_.contains(object.get())) warn_unused(*object);
@@ -162,7 +162,7 @@ class Loader {
     }
   }
 
-  /// Adds the copy of a shape at `to_world`, or one that `animation` moves.
+  /// Adds the copy of a shape at `to_world`, or one moved by `animation`.
   void place_copy(std::function<ShapePtr(const Transform&)> copy_to, const Transform& to_world,
                   const KeyedTransformPtr& animation) {
     try {
@@ -175,7 +175,7 @@ class Loader {
     }
   }
 
-  /// What a shape without a BSDF gets, as in Mitsuba: diffuse of reflectance 0.5, or black if it emits light.
+  /// BSDF of shapes that specify none, as in Mitsuba: diffuse with reflectance 0.5, or black if the shape emits light.
   BsdfPtr default_bsdf(bool emits) {
     DefaultBsdf& made = default_bsdfs_[emits];
     if (!made.bsdf) {
@@ -188,7 +188,7 @@ class Loader {
     return made.bsdf;
   }
 
-  /// The shapegroup of a description; each is made once.
+  /// The shape group of a description; each is created once.
   std::shared_ptr<const ShapeGroup> group(const ObjectPtr& object) {
     std::shared_ptr<const SceneObject> made;
     if (made_.find(object.get(), made)) return std::dynamic_pointer_cast<const ShapeGroup>(made);
@@ -219,8 +219,8 @@ class Loader {
     return shapes;
   }
 
-  /// Before the first instance of a group with shapes that emit: throws where the copies for all of them need too much
-  /// memory.
+  /// Called before the first instance of a group with emissive shapes: throws if the copies for all instances need too
+  /// much memory.
   void check_copies(const ObjectDescription& instance, const ShapeGroup& group) {
     const auto lights = group_lights_.find(&group);
     if (lights == group_lights_.end() || !groups_checked_.insert(&group).second) return;
@@ -245,7 +245,7 @@ class Loader {
 
   void place_instance(const ObjectPtr& object) {
     Parameters p(*object, factory_, diagnostics_);
-    // Groups are made by the loader, not by the factory: make them known before asking for children.
+    // Groups are created by the loader, not by the factory: register them before asking for children.
     for (const Property& property : object->properties)
       if (const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value))
         if (*child && (*child)->kind == "shape" && (*child)->type == "shapegroup") group(*child);
@@ -268,7 +268,7 @@ class Loader {
       return;
     }
     check_copies(*object, *groups[0]);
-    // Shapes that emit are copied to their place, so that each copy is a light with its own area and position.
+    // Emissive shapes are copied, so that each copy is a light with its own area and position.
     for (const GroupLight& member : group_lights_[groups[0].get()])
       place_copy(copies_of(member.shape, member.light, object->where), instance.to_world, animation);
     instance.group = groups[0];
@@ -304,7 +304,7 @@ class Loader {
   }
 
   void place_integrator(const ObjectPtr& outer) {
-    if (held_.contains(outer.get())) return;  // another one wraps it
+    if (held_.contains(outer.get())) return;  // wrapped by another one
     const ObjectPtr object = rendered_integrator(outer, diagnostics_);
     if (!object) return;
     if (integrator_) {
@@ -362,7 +362,7 @@ class Loader {
   SceneXml xml_;
   SceneJobs jobs_;
   std::unordered_set<const ObjectDescription*> placed_;
-  std::unordered_set<const ObjectDescription*> held_;  // by other objects than the scene
+  std::unordered_set<const ObjectDescription*> held_;  // by objects other than the scene
   SceneParts parts_;
   struct GroupLight {
     ShapePtr shape;
@@ -374,7 +374,7 @@ class Loader {
     ObjectPtr description;
     BsdfPtr bsdf;
   };
-  DefaultBsdf default_bsdfs_[2];  // of shapes that do not emit, and that do
+  DefaultBsdf default_bsdfs_[2];  // of non-emissive and emissive shapes
   ObjectPtr sensor_, integrator_, environment_;
   std::shared_ptr<const SensorSettings> sensor_made_;
   size_t n_degenerate_ = 0, n_degenerate_meshes_ = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whole scenes from files: what is made of them, and everything that is wrong with them at once.
+// Whole scenes from files: the objects created, and all errors reported at once.
 #include "io/load_scene.h"
 
 #include <gtest/gtest.h>
@@ -35,7 +35,7 @@ class LoadScene : public ::testing::Test {
     write("scene.xml", "<scene version=\"3.0.0\">\n" + body + "\n</scene>\n");
     return load_scene(folder_.file("scene.xml"), options);
   }
-  /// The errors, with the folder's name left out.
+  /// The error text, without the folder's path.
   std::string errors(const std::string& body, const LoadOptions& options = {}) {
     std::string text = message_of([&] { load(body, options); });
     for (size_t i; (i = text.find(folder_.file(""))) != std::string::npos;) text.erase(i, folder_.file("").size());
@@ -74,7 +74,7 @@ TEST_F(LoadScene, HasMitsubasDefaults) {
   EXPECT_EQ(s.filter.radius, 2.0f);
   EXPECT_EQ(s.integrator_type, "path");
   const CameraSettings& camera = s.scene->camera().settings();
-  // A lens of 50 mm before 36 x 24 mm: 2 atan(43.267 / 100) over the diagonal.
+  // A 50 mm lens on 36 x 24 mm film: 2 atan(43.267 / 100) over the diagonal.
   EXPECT_NEAR(camera.fov_degrees, 46.793f, 1e-3f);
   EXPECT_EQ(camera.fov_axis, FovAxis::kDiagonal);
   EXPECT_EQ(camera.near_clip, 0.01f);
@@ -220,8 +220,7 @@ TEST_F(LoadScene, RectangleHasMitsubasParametrisation) {
 
 TEST_F(LoadScene, CubeHasMitsubasParametrisation) {
   const LoadedScene s = load(kSensor + "<shape type=\"cube\"/>");
-  // Mitsuba 3.9.1: (u, v) where a ray towards the origin meets each face at the offsets (0.5, 0.2) along the other two
-  // axes.
+  // Mitsuba 3.9.1: (u, v) where a ray towards the origin hits each face, offset by (0.5, 0.2) along the other two axes.
   struct Case {
     Vec3 o, d, n;
     Vec2 uv;
@@ -285,7 +284,7 @@ TEST_F(LoadScene, ReportsEveryProblemOfShapesAtOnce) {
     EXPECT_NE(at, std::string::npos) << message << "\nnot in\n" << found.substr(from);
     if (at != std::string::npos) from = at;
   }
-  EXPECT_EQ(std::count(found.begin(), found.end(), '\n'), 13);  // and nothing else
+  EXPECT_EQ(std::count(found.begin(), found.end(), '\n'), 13);  // and no others
 }
 
 // ---- materials and lights ----

@@ -4,7 +4,7 @@
 namespace covary {
 namespace {
 
-/// Where the object names its first medium: "file:line:column: medium 'type'".
+/// Location of the object's first reference to a medium: "file:line:column: medium 'type'".
 std::string place_of_medium(const ObjectDescription& object) {
   for (const Property& property : object.properties)
     if (const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value); child && *child && (*child)->kind == "medium")
@@ -16,7 +16,7 @@ std::string place_of_medium(const ObjectDescription& object) {
 
 void name_path(ObjectDescription& integrator) {
   if (integrator.type != "volpath" && integrator.type != "volpathmis") return;
-  if (integrator.type == "volpathmis")  // chooses between weights of one expectation
+  if (integrator.type == "volpathmis")  // selects among estimators of the same expectation
     std::erase_if(integrator.properties, [](const Property& p) { return p.name == "use_spectral_mis"; });
   integrator.type = "path";
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The media that shapes and sensors of scene files name.
+// Media referenced by shapes and sensors in scene files.
 #pragma once
 
 #include <string>
@@ -13,13 +13,13 @@ struct ShapeMedia {
   MediumPtr interior, exterior;
 };
 
-/// Mitsuba's path tracers that see media, `volpath` and `volpathmis`, are `path` here.
+/// Mitsuba's volumetric path tracers, `volpath` and `volpathmis`, become `path` here.
 void name_path(ObjectDescription& integrator);
-/// Whether a <kind> may stand at top level to be referred to.
+/// Whether a <kind> may stand at top level to be referenced.
 bool is_part_of_media(const std::string& kind);
-/// What the shape of these parameters names. Shapes of a group may have none.
+/// The media that a shape references. Shapes in a group must have none.
 ShapeMedia read_media(Parameters& shape, bool in_group);
-/// Gives them to the shape, and tells the scene. `no_bsdf`: the shape names none.
+/// Assigns the media to the shape and registers them with the scene. `no_bsdf`: the shape specifies no BSDF.
 void use_media(const ShapeMedia& media, Parameters& parameters, Shape& shape, bool no_bsdf, SceneParts& parts);
 void use_camera_medium(const MediumPtr& medium, const ObjectDescription& sensor, SceneParts& parts);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Media in scene files: which shape and which sensor has which, and what is wrong.
+// Media in scene files: their assignment to shapes and sensors, and errors.
 #include "io/media.h"
 
 #include <gtest/gtest.h>

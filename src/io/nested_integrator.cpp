@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Integrators of Mitsuba that render another one and write more channels beside its image:
+// Mitsuba's integrators that render a nested one and write additional channels:
 //
 // | type     | adds                                  | parameters besides the nested integrator |
 // |----------|---------------------------------------|-------------------------------------------|
 // | `moment` | the mean square of each channel       |                                           |
-// | `aov`    | what `aovs` names of the first surface | `aovs`                                    |
+// | `aov`    | `aovs` of the first surface hit       | `aovs`                                    |
 //
-// and `ptracer`, which is read as `bdpt`.
+// and `ptracer`, which becomes `bdpt`.
 #include "io/nested_integrator.h"
 
 #include <fmt/format.h>
@@ -18,7 +18,7 @@ namespace {
 
 bool wraps(const ObjectDescription& object) { return object.type == "moment" || object.type == "aov"; }
 
-/// Takes out what every integrator of Mitsuba accepts and has no effect on the image.
+/// Removes parameters that every Mitsuba integrator accepts and that do not affect the image.
 ObjectPtr without_execution(const ObjectPtr& object, Diagnostics& diagnostics) {
   auto changed = std::make_shared<ObjectDescription>(*object);
   const auto has_no_effect = [&](const Property& p) {
@@ -33,13 +33,13 @@ ObjectPtr without_execution(const ObjectPtr& object, Diagnostics& diagnostics) {
   return changed;
 }
 
-/// The one integrator in a wrapper; null after recording an error.
+/// The only integrator in a wrapper; null after recording an error.
 ObjectPtr nested_integrator(const ObjectDescription& wrapper, Diagnostics& diagnostics) {
   ObjectPtr nested;
   size_t n_nested = 0;
   for (const Property& property : wrapper.properties) {
     const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value);
-    if (object && !*object) continue;  // reported when it was read
+    if (object && !*object) continue;  // reported while reading
     if (object && (*object)->kind == "integrator") {
       if (n_nested++ == 0) nested = *object;
     } else if (!(property.name == "aovs" && wrapper.type == "aov") && property.name != "hide_emitters") {
@@ -60,7 +60,7 @@ ObjectPtr nested_integrator(const ObjectDescription& wrapper, Diagnostics& diagn
   return nested;
 }
 
-/// `ptracer`, paths from the lights alone, as `bdpt`, which has them among others.
+/// `ptracer` (light tracing) becomes `bdpt`, which includes that strategy.
 ObjectPtr light_tracing(const ObjectDescription& object, Diagnostics& diagnostics) {
   auto changed = std::make_shared<ObjectDescription>(object);
   changed->type = "bdpt";
@@ -83,7 +83,7 @@ ObjectPtr rendered_integrator(const ObjectPtr& object, Diagnostics& diagnostics)
                                : "the channels of 'aovs' are left out (--aovs writes albedo, normals and positions)";
   diagnostics.warn(object->where, fmt::format("of integrator '{}' the image of '{}' is rendered; {}", object->type,
                                               nested->type, left_out));
-  return rendered_integrator(nested, diagnostics);  // nesting is limited and has no cycles, see xml_reader.cpp
+  return rendered_integrator(nested, diagnostics);  // nesting is finite and acyclic, see xml_reader.cpp
 }
 
 }  // namespace covary

@@ -6,7 +6,7 @@
 namespace covary {
 
 /// The integrator that renders the image: `object` itself, or the one that `moment` or `aov` wraps, without settings of
-/// Mitsuba's internals (samples_per_pass, block_size, timeout). Warns about what is left out. Null after recording an
+/// Mitsuba's internals (samples_per_pass, block_size, timeout). Warns about what is dropped. Null after recording an
 /// error.
 ObjectPtr rendered_integrator(const ObjectPtr& object, Diagnostics& diagnostics);
 

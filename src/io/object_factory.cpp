@@ -17,7 +17,7 @@
 namespace covary {
 namespace {
 
-/// The parts of a sensor have no registries of their own: what they say is settings.
+/// Parts of a sensor have no registries of their own; they only hold settings.
 std::span<const Plugin<SceneObject>> setting_plugins(const std::string& kind) {
   static constexpr auto kFilter = [](Parameters& p) -> std::shared_ptr<SceneObject> { return make_filter(p); };
   static constexpr auto kFilm = [](Parameters& p) -> std::shared_ptr<SceneObject> { return make_film(p); };
@@ -37,7 +37,7 @@ std::span<const Plugin<SceneObject>> setting_plugins(const std::string& kind) {
   return {};
 }
 
-/// What to do instead of Mitsuba's plugins that are not supported.
+/// What to use instead of Mitsuba plugins that are not supported.
 std::string advice(const ObjectDescription& description) {
   struct Advice {
     const char *kind, *type, *text;
@@ -135,7 +135,7 @@ std::optional<std::string> SceneFactory::resolve_file(const std::string& name, c
 
 namespace {
 
-/// Type and value, numbers to the last bit.
+/// Type and value as text, numbers exactly.
 struct ValueText {
   std::string operator()(bool v) const { return v ? "b1" : "b0"; }
   std::string operator()(int64_t v) const { return fmt::format("i{}", v); }
@@ -172,7 +172,7 @@ std::string description_key(const ObjectDescription& object) {
   for (const Property& property : object.properties)
     parameters.push_back(property.name + "=" + std::visit(ValueText{}, property.value) + "\n");
   std::sort(parameters.begin(), parameters.end());
-  // Names of files mean something relative to the file they stand in.
+  // File names are relative to the file that contains them.
   std::string key =
       object.kind + "\n" + object.type + "\n" + std::filesystem::path(object.where.file).parent_path().string() + "\n";
   for (const std::string& parameter : parameters) key += parameter;

@@ -14,11 +14,11 @@
 
 namespace covary {
 
-/// Objects made so far, by their description; shared by the factories of one scene.
+/// Objects created so far, by description; shared by the factories of a scene.
 class MadeObjects {
  public:
   using Object = std::shared_ptr<const SceneObject>;
-  /// False when `description` was never made; `object` may be null for one that failed.
+  /// False if `description` was never created; `object` may be null if creation failed.
   bool find(const ObjectDescription* description, Object& object) const;
   void add(const ObjectDescription* description, Object object);
 
@@ -27,8 +27,8 @@ class MadeObjects {
   std::unordered_map<const ObjectDescription*, Object> objects_;
 };
 
-/// Makes textures, reflectance models, emitters and the parts of sensors through the registries of their modules. Each
-/// factory reports to one Diagnostics; several may work at the same time on descriptions that share no nested object.
+/// Creates textures, reflectance models, emitters and the parts of sensors through the registries of their modules.
+/// Each factory reports to one Diagnostics; several may work concurrently on descriptions that share no nested object.
 class SceneFactory final : public ObjectFactory {
  public:
   SceneFactory(MadeObjects& made, FileResolver& files, Diagnostics& diagnostics)
@@ -49,8 +49,8 @@ class SceneFactory final : public ObjectFactory {
 void report_unknown_type(const ObjectDescription& description, std::vector<std::string> supported,
                          Diagnostics& diagnostics);
 
-/// The plugin `type` of a registry, or null after recording an error that lists what is supported. `kind` and `extra`
-/// (more supported names) are for the message.
+/// The plugin `type` of a registry; null after recording an error that lists what is supported. `kind` and `extra`
+/// (further supported names) are for the message.
 template <typename T>
 const Plugin<T>* find_plugin(std::span<const Plugin<T>> plugins, const ObjectDescription& description,
                              Diagnostics& diagnostics, std::vector<std::string> extra = {}) {
@@ -61,8 +61,8 @@ const Plugin<T>* find_plugin(std::span<const Plugin<T>> plugins, const ObjectDes
   return nullptr;
 }
 
-/// What `make(parameters)` returns. Records what it throws, but for what the caller did wrong; reports parameters that
-/// nobody asked for when it does not throw (otherwise it may not have come to ask).
+/// Returns make(parameters). Records what it throws, except internal errors and kUsage errors of the caller; if it does
+/// not throw, reports unused parameters (otherwise it may not have reached them).
 template <typename Make>
 auto make_checked(Parameters& parameters, Make&& make) -> decltype(make(parameters)) {
   try {
@@ -76,12 +76,12 @@ auto make_checked(Parameters& parameters, Make&& make) -> decltype(make(paramete
   }
 }
 
-/// A text that two descriptions without nested objects share exactly when they describe the same thing: equal kind,
-/// type and parameters in any order. Ids and places in the file do not matter.
+/// A text that is equal for two descriptions without nested objects if and only if they describe the same object: same
+/// kind, type and parameters in any order. Ids and locations in the file are ignored.
 std::string description_key(const ObjectDescription& object);
 
-/// The objects that another one than the scene holds or refers to: those written at the top of the scene's file for
-/// this alone have no place in the scene itself.
+/// Objects that other objects hold or reference. Those defined at top level only to be referenced are not part of the
+/// scene itself.
 inline std::unordered_set<const ObjectDescription*> held_objects(const ObjectDescription& scene) {
   std::unordered_set<const ObjectDescription*> held;
   visit_properties(scene, [&](const ObjectDescription& object, const Property& property) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes of pbrt against the same scenes in Mitsuba's XML by hand: rays of the camera, what they meet, its reflection
-// and light. Nothing is statistical; numbers are equal but for the rounding of the transformations.
+// pbrt scenes against the same scenes written by hand in Mitsuba XML: camera rays, hits, reflection and light. No
+// statistics; numbers agree up to rounding in the transformations.
 #include "formats/pbrt_reader.h"
 
 #include <fmt/format.h>
@@ -146,7 +146,7 @@ ObjectInstance "ball"
 LightSource "point" "point3 from" [ 0 0 4 ] "rgb I" [ 1 2 3 ]
 )";
 
-// The example of pbrt's documentation of its files, in short.
+// The example in pbrt's documentation of the file format, shortened.
 TEST_F(Pbrt, IsTheSceneByHand) {
   const LoadedScene a = pbrt(kPbrtHead + kGlassAndFloor);
   write("floor.ply", kFloor);
@@ -199,9 +199,9 @@ WorldBegin
   test_support::expect_same_scene(a, b, 80);
 }
 
-/// The images of infinite lights: pbrt's axes of the square, turned by the light's transformation.
+/// Images of infinite lights: pbrt's axes of the square, rotated by the light's transformation.
 TEST_F(Pbrt, ImagesOfInfiniteLightsShineFromTheirDirections) {
-  // Texels of 1, 2, 3 around +z, x < 0 and y < 0 first; the corners are those around -z.
+  // Texels 1, 2, 3 lie around +z, x < 0 and y < 0 first; those around -z are at the corners.
   std::string texels;
   for (int i = 0; i < 16; ++i) texels += std::string(3, static_cast<char>(i * 16));
   write("sky.ppm", "P6\n4 4\n255\n" + texels);
@@ -214,7 +214,7 @@ Shape "sphere"
 )");
   ASSERT_TRUE(a.scene->environment());
   const auto expect = [&](const Vec3& local, int texel) {
-    const Vec3 d = normalize(Vec3{local.y, local.x, local.z});  // turned by 90 degrees, then mirrored
+    const Vec3 d = normalize(Vec3{local.y, local.x, local.z});  // rotated by 90 degrees, then mirrored
     EXPECT_NEAR(a.scene->environment()->environment(d).radiance.g,
                 2 * srgb_to_linear(static_cast<float>(texel * 16) / 255), 1e-4f)
         << texel;
@@ -228,7 +228,7 @@ Shape "sphere"
   expect({1, 0.1f, 0.1f}, 11);
 }
 
-/// Round tubes along the curves: their height above the axis is the radius that pbrt's widths give.
+/// Round tubes along the curves: the height above the axis is the radius given by pbrt's widths.
 TEST_F(Pbrt, CurvesAreTubes) {
   const LoadedScene a = pbrt(R"(Camera "perspective"
 WorldBegin
@@ -244,7 +244,7 @@ Shape "curve" "string basis" "bspline" "point3 P" [ -1 2 0  0 2 0  1 2 0  2 2 0 
 Material "hair" "rgb reflectance" [ .1 .2 .3 ]
 Shape "curve" "string type" "cylinder" "point3 P" [ -1 4 0  0 5 0  0 5 0  1 4 0 ] "float width" .2
 )");
-  EXPECT_EQ(a.scene->n_shapes(), 2u);  // those of one material are one
+  EXPECT_EQ(a.scene->n_shapes(), 2u);  // curves of one material are merged
   const auto height = [&](float x, float y) {
     SurfaceHit hit;
     return a.scene->intersect({{x, y, 10}, {0, 0, -1}}, hit) ? hit.p.z : 0;
@@ -279,7 +279,7 @@ Shape "sphere"
 )");
   const Medium* camera = a.scene->camera_medium();
   ASSERT_TRUE(camera);
-  // The media before and behind what a ray along +z meets first.
+  // The media in front of and behind the first hit of a ray along +z.
   const auto media = [&](float z) {
     SurfaceHit hit;
     EXPECT_TRUE(a.scene->intersect({{0, 0, z}, {0, 0, 1}}, hit));
@@ -300,7 +300,7 @@ Shape "sphere"
 
 TEST_F(Pbrt, IncludesAreReadInPlace) {
   write("ball.pbrt", "Translate 0 0 1\nShape \"sphere\"\n");
-  // Heights of the uppermost spheres, one column each: the ball, after it moved all later ones; after that of Import.
+  // Height of the topmost sphere in each column: the ball, which moves all later ones; then that of Import.
   const LoadedScene a = pbrt(kPbrtHead + R"(
 Include "ball.pbrt"
 Translate 3 0 0 Shape "sphere"
@@ -375,7 +375,7 @@ LightSource "projection" "string filename" "a.png"
     EXPECT_TRUE(contains(found, message));
 }
 
-/// Chains that would overflow the stack, and mixtures of mixtures that would take for ever.
+/// Chains that would overflow the stack, and mixtures of mixtures that would take forever.
 TEST_F(Pbrt, ReferencesToReferencesEnd) {
   const std::string head = "Camera \"perspective\"\nWorldBegin\n";
   std::string deep = head + "Texture \"0\" \"spectrum\" \"constant\" \"rgb value\" [ .5 .5 .5 ]\n", wide = head;
@@ -429,7 +429,7 @@ ObjectInstance "lamp"
                        "scenes of pbrt have no parameters to define"));
 }
 
-/// 3,000 texts with a few bytes changed, cut off, or words exchanged: each loads, or is refused with a message.
+/// 3,000 texts with a few bytes changed, truncated, or words swapped: each loads or is rejected with a message.
 TEST_F(Pbrt, DamagedTextsDoNoHarm) {
   const std::string whole = kPbrtHead + kObjects + kGlassAndFloor;
   int loaded = 0;

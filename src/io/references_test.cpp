@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Objects at the top of a scene that others refer to, and integrators that wrap others.
+// Top-level objects that others reference, and integrators that wrap others.
 #include <gtest/gtest.h>
 
 #include "io/load_scene.h"
@@ -11,7 +11,7 @@ namespace {
 using test_support::contains;
 using test_support::message_of;
 
-/// The properties of the integrator that is made.
+/// Records the properties of the integrator created.
 struct IntegratorRecord : SceneObject {
   std::vector<std::string> names;
 };

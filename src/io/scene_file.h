@@ -9,17 +9,17 @@
 
 namespace covary {
 
-/// Whether a file of this name is read as a scene of pbrt-v4.
+/// Whether a file of this name is read as a pbrt-v4 scene.
 inline bool is_pbrt_file(std::string_view name) { return name.ends_with(".pbrt"); }
-/// Whether a file of this name is read as a scene of glTF 2.0.
+/// Whether a file of this name is read as a glTF 2.0 scene.
 inline bool is_gltf_file(std::string_view name) { return name.ends_with(".gltf") || name.ends_with(".glb"); }
-/// Whether a file of this name is a scene, rather than an image or else.
+/// Whether a file of this name is a scene, rather than an image or something else.
 inline bool is_scene_file(std::string_view name) {
   return name.ends_with(".xml") || is_pbrt_file(name) || is_gltf_file(name);
 }
 
-/// Reads the text of a scene file in the format that its name tells, as read_scene_xml(). Throws Error(kInput) with all
-/// problems where there is no scene to go on with, and Error(kUsage) for defines that the format has no use for.
+/// Reads the text of a scene file in the format given by its name; see read_scene_xml(). Throws Error(kInput) with all
+/// problems if no scene results, and Error(kUsage) for defines that the format cannot use.
 SceneXml read_scene_file(std::string_view text, const std::string& name,
                          const std::map<std::string, std::string>& defines, FileResolver& files,
                          Diagnostics& diagnostics);

@@ -14,13 +14,13 @@
 namespace covary {
 namespace {
 
-/// Whether no other objects are nested in it.
+/// Whether it has no nested objects.
 bool is_leaf(const ObjectDescription& object) {
   return std::none_of(object.properties.begin(), object.properties.end(),
                       [](const Property& p) { return std::holds_alternative<ObjectPtr>(p.value); });
 }
 
-/// False for the shapes that only place others.
+/// False for shapes that only place others.
 bool has_surface(const ObjectDescription& shape) { return shape.type != "instance" && shape.type != "shapegroup"; }
 
 void make_surface(ShapeJob& job) {
@@ -104,8 +104,8 @@ void SceneJobs::append_diagnostics_of_shapes(Diagnostics& diagnostics) const {
 
 namespace {
 
-constexpr double kOther = 500;                // a shape that is no mesh, and the rest of one that is
-constexpr double kTree = 90, kSampling = 84;  // per triangle, measured with grids of 44 thousand and 2 million
+constexpr double kOther = 500;                // a shape that is not a mesh, and the fixed part of one that is
+constexpr double kTree = 90, kSampling = 84;  // per triangle, measured on grids of 44 thousand and 2 million
 
 }  // namespace
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Work that can be done in parallel while a scene loads: everything that reads files or computes tables, which are
-// textures and emitters without nested objects, and the surfaces of shapes.
+// Parallel work while a scene loads: everything that reads files or computes tables, that is textures and emitters
+// without nested objects, and the surfaces of shapes.
 #pragma once
 
 #include <memory>
@@ -18,7 +18,7 @@
 
 namespace covary {
 
-/// A shape while it is made: its surface in parallel, then material and light.
+/// A shape under construction: its surface in parallel, then material and light.
 struct ShapeJob {
   ShapeJob(ObjectPtr object, MadeObjects& made, FileResolver& files)
       : description(std::move(object)),
@@ -31,32 +31,32 @@ struct ShapeJob {
   Diagnostics diagnostics;
   SceneFactory factory;
   Parameters parameters;
-  ShapePtr shape;  ///< null where it could not be made
+  ShapePtr shape;  ///< null if it could not be created
   bool in_group = false;
-  KeyedTransformPtr to_world;        ///< of a shape that moves; `shape` is in its own space
-  const AreaLight* light = nullptr;  ///< of a shape in a group, or that moves: each copy becomes a light of its own
-  bool asked_everything = false;     ///< else what is left over says nothing about unknown parameters
+  KeyedTransformPtr to_world;        ///< of a moving shape; `shape` is in object space
+  const AreaLight* light = nullptr;  ///< of a shape in a group or that moves: each copy becomes its own light
+  bool asked_everything = false;     ///< otherwise unused parameters prove nothing
 };
 
 class SceneJobs {
  public:
   SceneJobs(MadeObjects& made, FileResolver& files) : made_(made), files_(files) {}
 
-  /// The jobs of a scene. Equal textures are made once.
+  /// Collects the jobs of a scene. Equal textures are created once.
   void collect(const ObjectDescription& scene);
 
-  /// Makes all of them. Problems of textures and emitters go to `diagnostics`, those of shapes stay with their jobs.
+  /// Runs all jobs. Problems of textures and emitters go to `diagnostics`; those of shapes stay with their jobs.
   void run(Diagnostics& diagnostics);
 
-  /// The job of a shape that has a surface of its own; null for other objects.
+  /// The job of a shape that has its own surface; null for other objects.
   ShapeJob* shape(const ObjectDescription* description) const;
 
-  /// In the order of the file.
+  /// In file order.
   void append_diagnostics_of_shapes(Diagnostics& diagnostics) const;
 
  private:
   struct LeafJob {
-    std::vector<ObjectPtr> descriptions;  // equal ones
+    std::vector<ObjectPtr> descriptions;  // with equal content
     Diagnostics diagnostics;
   };
   void collect_leaves(const ObjectPtr& object, std::unordered_set<const ObjectDescription*>& seen);
@@ -70,16 +70,16 @@ class SceneJobs {
   std::unordered_map<const ObjectDescription*, ShapeJob*> shapes_by_description_;
 };
 
-// Memory of shapes, computed before it is allocated (core/memory_limit.h): a few lines of a scene can place a mesh
+// Memory of shapes, estimated before it is allocated (core/memory_limit.h): a few lines in a scene can place a mesh
 // thousands of times.
 
-/// Approximate bytes of the shape's arrays.
+/// Approximate size of the shape's arrays in bytes.
 double array_bytes(const Shape& shape);
 
-/// Approximate bytes that a scene needs for the shape besides these: the BVH, and sampling tables of emitters.
+/// Approximate bytes that a scene needs for the shape in addition: the BVH, and sampling tables of emitters.
 double table_bytes(const Shape& shape, bool emits);
 
-/// Throws Error(kInput) if the tables of all shapes need too much. `file`: of the scene.
+/// Throws Error(kInput) if the tables of all shapes need too much memory. `file`: the scene's file, for the message.
 void require_table_memory(const std::string& file, const SceneParts& parts);
 
 }  // namespace covary

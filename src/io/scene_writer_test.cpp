@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes that were converted to XML are the same to the last bit: every property of every object, wherever it stands.
+// Scenes converted to XML are identical to the last bit: every property of every object, from every source.
 #include "formats/scene_writer.h"
 
 #include <fmt/format.h>
@@ -28,7 +28,7 @@ class SceneWriter : public ::testing::Test {
     return folder_.file(name);
   }
 
-  /// The description of a scene file, which has no errors.
+  /// The description read from a scene file, which must have no errors.
   std::shared_ptr<const ObjectDescription> read(const std::string& path) {
     const FileView file(path);
     Diagnostics diagnostics;
@@ -49,15 +49,15 @@ class SceneWriter : public ::testing::Test {
     return result;
   }
 
-  /// The object in one text: all that it holds, numbers to the last bit; the content of files in place of their names,
-  /// and of references what they refer to.
+  /// The whole content of an object as text, numbers exact, with the content of files instead of their names and
+  /// referenced objects instead of references.
   std::string text_of(const ObjectDescription& object, const std::string& folder) {
     std::vector<std::string> parts;
     for (const Property& p : object.properties) {
       const Value& v = p.value;
       const std::string name = p.name == kEmbeddedData ? "filename" : p.name;
       if (const auto* child = std::get_if<ObjectPtr>(&v); child && *child) {
-        // The order of objects counts, that of other properties does not.
+        // The order of nested objects matters, that of other properties does not.
         parts.push_back("~" + std::to_string(parts.size()) + name + text_of(**child, folder));
       } else if (const auto* text = std::get_if<std::string>(&v)) {
         const bool file = p.name == "filename";
@@ -96,7 +96,7 @@ class SceneWriter : public ::testing::Test {
     return text;
   }
 
-  /// What stands in the scene, without what stands there for others to refer to.
+  /// The objects of the scene, excluding those that are only there to be referenced.
   std::vector<std::string> objects_of(const ObjectDescription& scene, const std::string& folder) {
     std::vector<std::string> all;
     for (const Property& p : scene.properties) {
@@ -163,9 +163,9 @@ TEST_F(SceneWriter, ScenesOfPbrtStayTheSameToTheLastBit) {
   write("picture.ppm", "P6\n1 1\n255\nabc");
   const std::string from = write("scene.pbrt", kScene);
   const ConvertedScene converted = convert(from, "out.xml");
-  EXPECT_EQ(converted.document.files.size(), 2u);  // the triangle is there three times
+  EXPECT_EQ(converted.document.files.size(), 2u);  // the triangle is used three times
   expect_same(from, folder_.file("out.xml"), 10);
-  // Once more it is the same text, but for the name in the comment and the files.
+  // Converting again gives the same text, except for the name in the comment and the files.
   const ConvertedScene again = convert(folder_.file("out.xml"), "again.xml");
   EXPECT_TRUE(again.document.files.empty());
   const auto body = [](const std::string& xml) { return xml.substr(xml.find("<scene")); };
@@ -200,7 +200,7 @@ TEST_F(SceneWriter, ScenesOfMitsubaAreBroughtToTheNewestVersion) {
   EXPECT_EQ(shapes(from).size(), 3u);
 }
 
-/// Numbers of all sizes are read as they were written.
+/// Numbers of all magnitudes are read back exactly.
 TEST_F(SceneWriter, NumbersKeepTheirBits) {
   std::string text = "Camera \"perspective\"\nWorldBegin\n";
   for (int i = 0; i < 500; ++i) {
@@ -216,7 +216,7 @@ TEST_F(SceneWriter, NumbersKeepTheirBits) {
   expect_same(from, folder_.file("numbers.xml"), 1000);
 }
 
-/// Mitsuba's `path` sees no media, and its environments lie by latitude and longitude.
+/// Mitsuba's `path` ignores media, and its environment maps are in latitude-longitude format.
 TEST_F(SceneWriter, MitsubaGetsWhatItHas) {
   std::string texels(48, 'a');
   write("sky.ppm", "P6\n4 4\n255\n" + texels);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sensors, films, reconstruction filters and samplers by the names and parameters of Mitsuba.
+// Sensors, films, reconstruction filters and samplers with Mitsuba's names and parameters.
 #include "io/sensor.h"
 
 #include <fmt/format.h>
@@ -53,7 +53,7 @@ std::shared_ptr<FilmSettings> make_film(Parameters& p) {
   if (film->crop_x + film->crop_width > film->width || film->crop_y + film->crop_height > film->height)
     p.error(fmt::format("the crop window of {} x {} pixels at ({}, {}) leaves the film of {} x {}", film->crop_width,
                         film->crop_height, film->crop_x, film->crop_y, film->width, film->height));
-  // Files are written as the command line says; these are accepted where they ask for what is written anyway.
+  // The command line determines the output file; these are accepted if they ask for what is written anyway.
   p.get_choice("file_format", "openexr", {"openexr", "exr"});
   if (p.get_choice("pixel_format", "rgb", {"rgb", "rgba"}) == "rgba") p.warn("no alpha channel is written");
   p.get_choice("component_format", "float32", {"float16", "float32"});
@@ -67,7 +67,7 @@ std::shared_ptr<SamplerSettings> make_sampler(Parameters& p) {
   auto sampler = std::make_shared<SamplerSettings>();
   sampler->type = p.type();
   sampler->sample_count = p.get_int("sample_count", 4, 1, kMaxInt);
-  p.get_int("seed", 0, 0, kMaxInt);  // the command line's --seed counts
+  p.get_int("seed", 0, 0, kMaxInt);  // --seed takes precedence
   p.get_bool("jitter", true);
   for (const char* ignored : {"strength", "dimension", "scramble"}) p.get_int(ignored, 0, -kMaxInt, kMaxInt);
   return sampler;

@@ -19,21 +19,21 @@ struct FilterObject : SceneObject {
 };
 
 struct SamplerSettings : SceneObject {
-  std::string type;  ///< its name in the scene; empty where there is none
+  std::string type;  ///< its name in the scene; empty if there is none
   int sample_count = 4;
 };
 
-/// <sensor>: the camera still without its film size, which the command line may change.
+/// <sensor>: the camera without its film size, which the command line may change.
 struct SensorSettings : SceneObject {
-  CameraSettings camera;       ///< where it is when the shutter opens
-  KeyedTransformPtr to_world;  ///< of a camera that moves, or null
+  CameraSettings camera;       ///< pose when the shutter opens
+  KeyedTransformPtr to_world;  ///< of an animated camera; otherwise null
   double shutter_open = 0, shutter_close = 0;
-  MediumPtr medium;  ///< in which the camera stands; null: none
+  MediumPtr medium;  ///< medium around the camera; null: none
   FilmSettings film;
   SamplerSettings sampler;
 };
 
-// Each records an error for whatever it does not support.
+// Each records an error for anything it does not support.
 std::shared_ptr<FilterObject> make_filter(Parameters& parameters);
 std::shared_ptr<FilmSettings> make_film(Parameters& parameters);
 std::shared_ptr<SamplerSettings> make_sampler(Parameters& parameters);

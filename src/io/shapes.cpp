@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shapes by the name scene files use.
+// Shapes by the names used in scene files.
 //
 // | parameter       | type      | default | meaning                                                              |
 // |-----------------|-----------|---------|----------------------------------------------------------------------|
-// | to_world        | transform | none    | from the shape's space into the scene                                |
+// | to_world        | transform | none    | from object space to world space                                     |
 // | flip_normals    | boolean   | false   | turn the surface inside out                                          |
 // | face_normals    | boolean   | false   | meshes: flat shading                                                 |
 // | filename        | string    |         | obj, ply, serialized, linearcurve, bsplinecurve                      |
@@ -55,7 +55,7 @@ std::shared_ptr<Shape> make_from_file(Parameters& p, const MeshPlacement& placem
   if (path.empty()) return nullptr;
   try {
     const FileView view(path);
-    // Arrays of the file's size, about, as they are read and as they are kept.
+    // Estimated at three times the file: the arrays as read, and as kept.
     require_memory(path, "its mesh", 3 * static_cast<double>(view.bytes().size()));
     return finish(p, read(view), placement);
   } catch (const Error& error) {
@@ -96,7 +96,7 @@ std::shared_ptr<Shape> make_rectangle(Parameters& p) {
   return finish(p, std::move(file), placement_of(p));
 }
 
-/// [-1, 1]^3; every face carries the whole unit square of (u, v).
+/// [-1, 1]^3; (u, v) cover the unit square on every face.
 std::shared_ptr<Shape> make_cube(Parameters& p) {
   // Per face: its normal, and its corners in the order (u, v) = (0, 1), (1, 1), (1, 0), (0, 0).
   struct Face {
@@ -145,7 +145,7 @@ std::shared_ptr<Shape> make_cylinder(Parameters& p) {
 
 std::shared_ptr<Shape> make_curves(Parameters& p, CurveKind kind) {
   const Transform to_world = p.get_transform("to_world");
-  p.get_float("silhouette_sampling_weight", 1);  // of Mitsuba's derivatives
+  p.get_float("silhouette_sampling_weight", 1);  // for Mitsuba's differentiable rendering
   if (const std::string* data = find_embedded(p)) return read_curves(*data, kind, to_world);
   const std::string path = p.require_file("filename");
   if (path.empty()) return nullptr;

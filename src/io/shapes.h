@@ -15,26 +15,26 @@
 
 namespace covary {
 
-/// All shapes that have a surface of their own, sorted by name ("shapegroup" and "instance" are made by the loader).
-/// What they make has no material and emits nothing; the loader adds both.
+/// All shapes with a surface of their own, sorted by name ("shapegroup" and "instance" are created by the loader). They
+/// are created without material and emitter; the loader adds both.
 std::span<const Plugin<Shape>> shape_plugins();
 
-/// The names that textures `mesh_attribute` of the shape's models and lights ask its mesh for.
+/// Attributes that `mesh_attribute` textures of the shape's models and lights read from its mesh.
 std::vector<std::string> wanted_attributes(const ObjectDescription& shape);
 
-// Copies of shapes at other places: of members of a shapegroup that emit light, and of shapes that move.
+// Copies of shapes with other transformations: of emissive members of a shape group, and of moving shapes.
 
-/// The function that copies the shape, with BSDF and media, to where a transformation takes it. With `light`, which
-/// need not live on, each copy is a light of its own. Copying throws Error(kInput), which begins with `where`, for a
-/// transformation that the shape cannot have.
+/// A function that copies the shape, with BSDF and media, to a given transformation. With `light`, which need not
+/// outlive the call, each copy is a light of its own. The function throws Error(kInput), starting with `where`, for a
+/// transformation that the shape does not support.
 std::function<ShapePtr(const Transform&)> copies_of(const ShapePtr& shape, const AreaLight* light,
                                                     const SourceLocation& where);
 
-/// A shape that moves by an <animation> of `to_world`, without that: in its own space. All others as they are.
+/// For a shape with an animated `to_world`: the shape in object space, without it. Other shapes unchanged.
 ObjectPtr in_own_space(const ObjectPtr& shape, KeyedTransformPtr& to_world);
 
-/// Text of one control point a line, "x y z radius"; blank lines begin a new curve. Points are moved by `to_world`,
-/// radii are not. Throws Error(kInput) that names the line.
+/// Parses text with one control point per line, "x y z radius"; blank lines start a new curve. Points are transformed
+/// by `to_world`, radii are not. Throws Error(kInput) naming the line.
 std::shared_ptr<CurveShape> read_curves(std::string_view text, CurveKind kind, const Transform& to_world);
 
 }  // namespace covary
