@@ -32,7 +32,7 @@ std::string FileResolver::resolve(const std::string& name, const SourceLocation&
     candidates.push_back(fs::path(where.file).parent_path() / name);
   }
   std::error_code ignored;
-  std::string other;  // something of that name which is no file
+  std::string other;  // something of that name that is not a regular file
   for (const fs::path& candidate : candidates) {
     if (fs::is_regular_file(candidate, ignored)) {
       const std::lock_guard lock(mutex_);
@@ -48,7 +48,7 @@ std::string FileResolver::resolve(const std::string& name, const SourceLocation&
     return "";
   }
 
-  // Suggest what lies in the folder the name points into.
+  // Suggest files in the folder that the name points to.
   std::vector<std::string> neighbours;
   std::string searched;
   for (size_t i = 0; i < candidates.size(); ++i) {
@@ -73,13 +73,13 @@ std::map<std::string, std::string> FileResolver::files() const {
 }
 
 std::string FileResolver::content_hash(const std::string& scene_hash) const {
-  std::vector<std::pair<std::string, std::string>> files;  // name in the scene, path; afterwards: name, hash
+  std::vector<std::pair<std::string, std::string>> files;  // name in the scene, path; later: name, hash
   for (const auto& [path, name] : this->files()) files.emplace_back(name, path);
   parallel_for(files.size(), [&](size_t i) {
     try {
       files[i].second = hash_text(hash_bytes(FileView(files[i].second).bytes()));
     } catch (const Error&) {
-      files[i].second = "unreadable";  // whoever needed the file has recorded why
+      files[i].second = "unreadable";  // whoever needed the file has reported why
     }
   });
   std::sort(files.begin(), files.end());

@@ -13,20 +13,20 @@
 
 namespace covary {
 
-/// Finds the files a scene names and remembers them, for the scene's content hash. Thread-safe once all folders are
-/// added.
+/// Finds the files referenced by a scene and records them for the scene's content hash. Thread-safe once all folders
+/// have been added.
 class FileResolver {
  public:
-  /// Searches folders in reverse order of addition, then the folder of the XML file that names the file.
+  /// Folders are searched in reverse order of addition, then the folder of the XML file that references the file.
   void add_folder(const std::string& folder);
 
-  /// Path of the existing regular file `name`; records an error at `where` and returns "" when there is none.
+  /// Path of the existing regular file `name`; records an error at `where` and returns "" if there is none.
   std::string resolve(const std::string& name, const SourceLocation& where, Diagnostics& diagnostics);
 
-  /// Every file found so far by resolve(), by its path, with the name the scene used.
+  /// Every file that resolve() has found, by path, with the name used in the scene.
   std::map<std::string, std::string> files() const;
 
-  /// Hash of names and contents of these files; an unreadable file counts as such.
+  /// Hash of names and contents of these files; unreadable files are hashed as such.
   std::string content_hash(const std::string& scene_hash) const;
 
  private:
@@ -35,10 +35,10 @@ class FileResolver {
   std::map<std::string, std::string> files_;
 };
 
-/// The bytes of a file, mapped into memory for reading.
+/// The bytes of a file, memory-mapped for reading.
 class FileView {
  public:
-  /// Throws Error(kIo) when the file cannot be opened or is not a regular file.
+  /// Throws Error(kIo) if the file cannot be opened or is not a regular file.
   explicit FileView(const std::string& path);
   ~FileView();
   FileView(const FileView&) = delete;

@@ -18,8 +18,8 @@ ObjectBuilder make_object(const std::string& kind, const std::string& type, cons
 void set_property(ObjectDescription& object, const std::string& name, Value value) {
   if (const Transform* transform = std::get_if<Transform>(&value)) {
     try {
-      value = Transform(transform->matrix()) * Transform();  // as of <matrix> in XML
-    } catch (const Error&) {                                 // scaled by so little that it looks singular
+      value = Transform(transform->matrix()) * Transform();  // as for <matrix> in XML
+    } catch (const Error&) {                                 // scaled down so much that it appears singular
     }
   }
   object.properties.push_back({name, std::move(value), object.where});

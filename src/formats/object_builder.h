@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Helpers of the readers of formats other than XML, to build descriptions of objects.
+// Helpers for building object descriptions, for readers of formats other than XML.
 #pragma once
 
 #include <initializer_list>
@@ -16,11 +16,10 @@ namespace covary {
 using ObjectBuilder = std::shared_ptr<ObjectDescription>;
 ObjectBuilder make_object(const std::string& kind, const std::string& type, const SourceLocation& where,
                           std::initializer_list<std::pair<std::string, Value>> properties = {});
-/// Transformations are defined by their 16 numbers, which is all that a file can hold: the inverse is computed from
-/// these.
+/// Transformations are normalised to their 16 numbers, as a file would store them; the inverse is computed from these.
 void set_property(ObjectDescription& object, const std::string& name, Value value);
 
-/// Calls `visit(object, property)` once for each property of `root` and of all objects that it holds or refers to,
+/// Calls `visit(object, property)` once for each property of `root` and of all objects that it holds or references,
 /// directly or indirectly.
 template <typename Visit>
 void visit_properties(const ObjectDescription& root, const Visit& visit) {
@@ -37,7 +36,7 @@ void visit_properties(const ObjectDescription& root, const Visit& visit) {
   }
 }
 
-// Meshes inside a scene's own file become PLY files in memory, the property `data` of a shape `ply`.
+// Meshes embedded in a scene's own file become PLY files in memory: property `data` of a shape `ply`.
 
 struct EmbeddedMesh {
   std::vector<double> positions, normals, uvs;  ///< three, three and two numbers per vertex; the last two may be empty

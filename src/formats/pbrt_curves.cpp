@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Curves of pbrt-v4 as tubes around cubic B-splines, a curve of several segments as one or as one for each.
+// pbrt-v4 curves as tubes around cubic B-splines; a curve of several segments becomes one spline, or one per segment.
 //
-// A Bezier segment b0 … b3 is the B-spline segment of the control points 6 b0 - 7 b1 + 2 b2, 2 b1 - b2, 2 b2 - b1 and
-// 2 b1 - 7 b2 + 6 b3; a radius that is linear along it, r0 … r1, that of r0 - d, r0, r1, r1 + d with d = r1 - r0.
+// A Bezier segment b0 … b3 is the B-spline segment with control points 6 b0 - 7 b1 + 2 b2, 2 b1 - b2, 2 b2 - b1 and 2
+// b1 - 7 b2 + 6 b3; a radius varying linearly from r0 to r1 has control values r0 - d, r0, r1, r1 + d with d = r1 - r0.
 #include <fmt/format.h>
 
 #include <array>
@@ -23,7 +23,7 @@ Point mix(std::initializer_list<std::pair<double, Point>> terms) {
   return sum;
 }
 
-/// Writes curves, moved to their place.
+/// Writes transformed curves.
 class CurveText {
  public:
   explicit CurveText(const Transform& to_world) : to_world_(to_world) {
@@ -33,13 +33,13 @@ class CurveText {
                           m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
     scale_ = std::cbrt(std::abs(volume));
   }
-  /// A radius below 0, as beyond a tip, becomes 0.
+  /// Negative radii, as beyond a tip, become 0.
   void add(const Point& p, double radius) {
     const Vec3 placed = to_world_.point({static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])});
     text += fmt::format("{} {} {} {}\n", placed.x, placed.y, placed.z, std::max(radius, 0.0) * scale_);
   }
   void end() { text += "\n"; }
-  /// Towards a tip in pieces, because the last of them keeps a sixth of its first radius.
+  /// Subdivided towards a tip, because the last piece keeps a sixth of its first radius.
   void add_bezier(const std::array<Point, 4>& b, double r0, double r1, int n_halvings = 0) {
     const double d = r1 - r0;
     if (std::min(r0 - d, r1 + d) < 0 && std::max(r0, r1) > 0 && n_halvings < 3) {

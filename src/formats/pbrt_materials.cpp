@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Materials of pbrt-v4 as reflectance models of the same reflection, but for 'coateddiffuse' (see there).
+// pbrt-v4 materials as models with the same reflection, except 'coateddiffuse' (see there).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,7 +15,7 @@ ObjectBuilder two_sided(const ObjectBuilder& model) {
   return make_object("bsdf", "twosided", model->where, {{"", ObjectPtr(model)}});
 }
 
-/// Width of the distribution of normals along u and v.
+/// Roughness (alpha) along u and v.
 struct Roughness {
   Value u = 0.0, v = 0.0;
   bool smooth() const { return is_smooth(u) && is_smooth(v); }
@@ -24,7 +24,7 @@ struct Roughness {
     set_property(model, "alpha_u", u);
     set_property(model, "alpha_v", v);
   }
-  /// pbrt takes widths below this for a mirror.
+  /// pbrt treats smaller alphas as perfectly smooth.
   static bool is_smooth(const Value& alpha) {
     return std::holds_alternative<double>(alpha) && std::get<double>(alpha) < 1e-3;
   }
@@ -75,7 +75,7 @@ ObjectBuilder conductor(PbrtParameters& p, const PbrtNames& names) {
       p.error("has a 'reflectance' that is not an 'rgb'; others are not supported");
       return nullptr;
     }
-    // pbrt: the k that reflects this much at eta = 1.
+    // pbrt: the k with this reflectance at eta = 1.
     Spectrum k;
     for (int c = 0; c < 3; ++c) {
       const float r = std::clamp(colour->rgb[c], 0.0f, 0.9999f);
@@ -123,8 +123,8 @@ ObjectBuilder dielectric(PbrtParameters& p, const PbrtNames& names, bool thin) {
   return model;
 }
 
-/// pbrt follows light between the layers; `plastic` has that in closed form, without what the clear layer's thickness
-/// takes away.
+/// pbrt simulates light transport between the layers; `plastic` has it in closed form, without absorption over the
+/// thickness of the clear layer.
 ObjectBuilder coated_diffuse(PbrtParameters& p, const PbrtNames& names) {
   const auto rough = roughness(p, names);
   const auto reflectance = p.has("reflectance") ? spectrum_value(p, "reflectance", names) : Value(0.5);
@@ -183,7 +183,7 @@ ObjectBuilder mix(PbrtParameters& p, const PbrtNames& names) {
   return model;
 }
 
-/// The same model as here. Without a colour it is pbrt's brown hair.
+/// The same model as ours. Without a colour, it is pbrt's brown hair.
 ObjectBuilder hair(PbrtParameters& p, const PbrtNames& names) {
   auto model = make_object("bsdf", "hair", p.where());
   const double n = p.get_float("beta_n", 0.3);

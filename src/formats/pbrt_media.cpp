@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Media of pbrt-v4: what absorbs and scatters by length, as an extinction and the fraction of it that scatters.
+// pbrt-v4 media: absorption and scattering coefficients as extinction and single-scattering albedo.
 #include <fmt/format.h>
 
 #include "formats/pbrt_objects.h"
@@ -7,7 +7,7 @@
 namespace covary {
 namespace {
 
-/// A cross section per unit of length; pbrt's default is 1.
+/// A coefficient per unit length; pbrt's default is 1.
 std::optional<Spectrum> cross_section(PbrtParameters& p, const char* name) {
   if (!p.has(name)) return Spectrum(1);
   const auto value = spectrum_value(p, name, {});
@@ -34,7 +34,7 @@ ObjectBuilder make_pbrt_medium(const std::string& type, PbrtParameters& p) {
   Spectrum albedo;
   Spectrum extinction = *absorbed + *scattered;
   for (int c = 0; c < 3; ++c) albedo[c] = extinction[c] > 0 ? (*scattered)[c] / extinction[c] : 0;
-  // Mitsuba takes no colour above 1 for an extinction.
+  // Mitsuba accepts no extinction colour above 1.
   const float unit = std::max(max_component(extinction), 1.0f);
   extinction = extinction / unit;
   auto medium = make_object("medium", "homogeneous", p.where(),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Objects of pbrt-v4 scene files as descriptions of covary's own objects. Anything without a counterpart is an error at
-// its place in the file; a slight difference in looks is a warning.
+// Objects of pbrt-v4 scene files as descriptions of covary's own objects. Anything without an equivalent is an error at
+// its location in the file; slight differences in appearance are warnings.
 #pragma once
 
 #include <map>
@@ -16,16 +16,16 @@
 
 namespace covary {
 
-/// Named objects that later ones refer to. Null for an object that could not be read.
+/// Named objects that later ones reference. Null for an object that could not be read.
 struct PbrtNames {
   std::map<std::string, ObjectPtr> float_textures, spectrum_textures, materials, media;
 };
 
-/// A number or a texture of numbers; `fallback` when absent, nullopt after an error.
+/// A float or a float texture; `fallback` if absent, nullopt after an error.
 std::optional<Value> float_value(PbrtParameters& p, const std::string& name, double fallback, const PbrtNames& names);
-/// A colour, a spectrum or a texture of colours; nullopt when absent or after an error.
+/// A colour, a spectrum or a spectrum texture; nullopt if absent or after an error.
 std::optional<Value> spectrum_value(PbrtParameters& p, const std::string& name, const PbrtNames& names);
-/// The emission of a light: spectra are scaled to a luminance of 1, as in pbrt; white when absent.
+/// The emission of a light: spectra are scaled to luminance 1, as in pbrt; white if absent.
 Spectrum light_colour(PbrtParameters& p, const std::string& name);
 
 /// A texture of class `type`; null after an error.
@@ -33,23 +33,23 @@ ObjectBuilder make_pbrt_texture(const std::string& type, PbrtParameters& p, cons
 /// A material; null after an error.
 ObjectBuilder make_pbrt_material(const std::string& type, PbrtParameters& p, const PbrtNames& names);
 
-/// A shape without material and light; null after an error.
+/// A shape without material or light; null after an error.
 ObjectBuilder make_pbrt_shape(const std::string& type, PbrtParameters& p, const PbrtPlacement& placement);
 
-/// The shape `curve`, a part of make_pbrt_shape().
+/// The shape `curve`, part of make_pbrt_shape().
 ObjectBuilder make_pbrt_curve(PbrtParameters& p, const PbrtPlacement& placement);
-/// Adds the curves of `more` to those of `first`, for scenes with one shape per hair; false if they are not curves.
+/// Appends the curves of `more` to `first`, for scenes with one shape per hair; false if they are not curves.
 bool join_pbrt_curves(ObjectDescription& first, const ObjectDescription& more);
 
 /// A medium; null after an error.
 ObjectBuilder make_pbrt_medium(const std::string& type, PbrtParameters& p);
 
-/// A light with its own position; null after an error, or if it is black.
+/// A light with its own transformation; null after an error, or if it is black.
 ObjectPtr make_pbrt_light(const std::string& type, PbrtParameters& p, const Transform& to_world);
 /// An area light for shapes; null after an error.
 ObjectPtr make_pbrt_area_light(const std::string& type, PbrtParameters& p);
 
-/// The directives before WorldBegin; they may come in any order.
+/// The directives before WorldBegin, in any order.
 struct PbrtView {
   ObjectBuilder sensor, film, filter, sampler, integrator;
   bool orthographic = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tokens of pbrt-v4 scene files, and the parameter lists of directives, "float radius" [ 2 ].
+// Tokens and parameter lists of pbrt-v4 scene files: "float radius" [ 2 ].
 #pragma once
 
 #include <array>
@@ -12,16 +12,16 @@
 
 namespace covary {
 
-/// Thrown to stop reading a file at an invalid word; the reason is in the diagnostics.
+/// Thrown to stop reading at an invalid token; the reason is in the diagnostics.
 struct PbrtStop {};
 
 struct PbrtToken {
   enum Kind { kEnd, kWord, kString, kOpen, kClose } kind = kEnd;
-  std::string text;  ///< without the quotes of a string
+  std::string text;  ///< strings without their quotes
   int line = 0, column = 0;
 };
 
-/// Splits text into tokens; "#" begins a comment.
+/// Splits text into tokens; "#" starts a comment.
 class PbrtTokens {
  public:
   PbrtTokens(std::string_view text, std::string file, Diagnostics& diagnostics)
@@ -34,11 +34,11 @@ class PbrtTokens {
   const std::string& file() const { return file_; }
   bool at_end() { return peek().kind == PbrtToken::kEnd; }
 
-  /// The next token, which must be a string; `what` names the expected one.
+  /// The next token, which must be a string; `what` says what is expected.
   std::string string(const char* what);
   /// The next token, which must be a finite number.
   double number();
-  /// `count` numbers, in brackets or not.
+  /// `count` numbers, with or without brackets.
   std::vector<double> numbers(size_t count);
 
  private:
@@ -60,17 +60,17 @@ struct PbrtParameter {
   bool used = false;
 };
 
-/// The parameters of one directive. Getters mark them as used, and record an error and return the fallback if type or
-/// length is wrong.
+/// The parameters of one directive. Getters mark them as used; on a wrong type or length they record an error and
+/// return the fallback.
 class PbrtParameters {
  public:
-  /// Reads from `tokens` up to the next directive. `what` names the object in messages: Shape "sphere".
+  /// Reads `tokens` up to the next directive. `what` names the object in messages: Shape "sphere".
   PbrtParameters(PbrtTokens& tokens, std::string what, const SourceLocation& where, Diagnostics& diagnostics);
 
   const std::string& what() const { return what_; }
   const SourceLocation& where() const { return where_; }
   bool has(const std::string& name) const;
-  /// Null when absent; marks it as used.
+  /// Null if absent; marks it as used.
   const PbrtParameter* find(const std::string& name);
   double get_float(const std::string& name, double fallback);
   int64_t get_integer(const std::string& name, int64_t fallback);
@@ -78,21 +78,21 @@ class PbrtParameters {
   std::string get_string(const std::string& name, const std::string& fallback);
   /// point3, vector3, normal3, and their older names.
   Vec3 get_vec3(const std::string& name, const Vec3& fallback);
-  /// The numbers of an array with `width` numbers per element; empty when absent.
+  /// The values of an array with `width` numbers per element; empty if absent.
   std::vector<double> get_array(const std::string& name, const std::string& type, size_t width);
 
   void error(const std::string& message);
   /// "parameter 'NAME' of WHAT MESSAGE"
   void error_at(const PbrtParameter& parameter, const std::string& message);
   void warn(const std::string& message);
-  /// Parameters without effect on what is rendered here.
+  /// Marks parameters that have no effect in this renderer as used.
   void ignore(std::initializer_list<const char*> names);
-  /// An error for each parameter that was not asked for.
+  /// Records an error for each unused parameter.
   void report_unknown();
 
  private:
   void read_values(PbrtTokens& tokens, PbrtParameter& parameter);
-  /// The parameter, if it has this type and `count` values.
+  /// The parameter, if it has one of these types and `count` values.
   const PbrtParameter* find(const std::string& name, std::initializer_list<const char*> types, size_t count);
 
   std::string what_;

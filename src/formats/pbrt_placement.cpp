@@ -38,7 +38,7 @@ bool change_placement(const std::string& word, PbrtTokens& tokens, const SourceL
     apply(
         [n = tokens.numbers(16)] {
           Matrix4 m;
-          for (size_t i = 0; i < 16; ++i) m[i % 4][i / 4] = n[i];  // column by column
+          for (size_t i = 0; i < 16; ++i) m[i % 4][i / 4] = n[i];  // column-major
           return Transform(m);
         },
         word == "Transform");

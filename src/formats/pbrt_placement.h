@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The directives of pbrt scene files that transform what follows them.
+// Directives of pbrt scene files that transform the objects after them.
 #pragma once
 
 #include <map>
@@ -9,7 +9,7 @@
 
 namespace covary {
 
-/// The placement of shapes and lights.
+/// Transformation and orientation of shapes and lights.
 struct PbrtPlacement {
   Transform to_world;
   bool reverse_orientation = false;
@@ -17,7 +17,7 @@ struct PbrtPlacement {
 /// CoordinateSystem: transformations by name.
 using PbrtSystems = std::map<std::string, Transform>;
 
-/// Executes the directive `word` with the words after it; false if it is not one of these.
+/// Executes the directive `word` with its arguments; false if it is not a transformation.
 bool change_placement(const std::string& word, PbrtTokens& tokens, const SourceLocation& where,
                       PbrtPlacement& placement, PbrtSystems& systems, Diagnostics& diagnostics);
 

@@ -16,7 +16,7 @@
 namespace covary {
 namespace {
 
-// Limits far above what scenes need, and low enough that no small file takes long or much memory.
+// Limits far above what scenes need, but low enough that no small file takes long or much memory.
 constexpr int kMostIncludes = 1000, kDeepest = 15;
 constexpr size_t kMostTextBytes = size_t{1} << 30;  // of all files together
 constexpr size_t kMostObjects = 1000000, kMostStates = 1000, kMostNesting = 64;
@@ -40,7 +40,7 @@ class Reader {
     try {
       read_file(text, name, 0);
     } catch (const PbrtStop&) {
-      return result;  // the reason was told
+      return result;  // the reason has been reported
     }
     if (!in_world_) diagnostics_.error(scene_->where, "the scene has no WorldBegin");
     if (!states_.empty()) diagnostics_.error(states_.back().where, "unterminated block");
@@ -55,9 +55,9 @@ class Reader {
   struct State {
     PbrtPlacement placement;
     ObjectPtr material, area_light, inside, outside;
-    bool material_failed = false;  // it was told, so what uses it says nothing
+    bool material_failed = false;  // reported already; users of it stay silent
   };
-  /// The last curves, to which others that follow with the same material belong.
+  /// The last curves, to which following ones with the same material are appended.
   struct Curves {
     ObjectBuilder shape;
     ObjectPtr material, inside, outside;
@@ -68,7 +68,7 @@ class Reader {
   };
   struct SavedState {
     State state;
-    bool whole;  // AttributeBegin; else of a transformation alone
+    bool whole;  // AttributeBegin; otherwise TransformBegin
     SourceLocation where;
   };
 
@@ -283,7 +283,7 @@ class Reader {
     }
   }
 
-  /// pbrt's: diffuse, of reflectance 0.5.
+  /// pbrt's default: diffuse with reflectance 0.5.
   ObjectPtr default_material() {
     if (default_material_) return default_material_;
     auto sides = make_object("bsdf", "twosided", scene_->where,
@@ -328,7 +328,7 @@ class Reader {
     }
   }
 
-  /// Null where it holds too much, which is an error.
+  /// Null if it holds too many objects, which is an error.
   ObjectBuilder limited(ObjectBuilder object) { return object && limit_.add(*object) ? object : nullptr; }
   PbrtParameters parameters(PbrtTokens& tokens, std::string what) {
     return {tokens, std::move(what), where_, diagnostics_};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scene files of pbrt-v4 -> ObjectDescription trees, like those that Mitsuba's XML becomes (xml_reader.h).
+// pbrt-v4 scene files -> ObjectDescription trees, as from Mitsuba XML (xml_reader.h).
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace covary {
 
-/// Reads the scene `text` and every file it includes; as read_scene_xml().
+/// Reads the scene `text` and every file it includes; see read_scene_xml().
 SceneXml read_scene_pbrt(std::string_view text, const std::string& name, FileResolver& files, Diagnostics& diagnostics);
 
 }  // namespace covary

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shapes of pbrt-v4. Meshes that stand in the scene file become PLY files in memory, the property `data` of `ply`.
+// Shapes of pbrt-v4. Meshes embedded in the scene file become PLY files in memory: property `data` of `ply`.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -18,7 +18,7 @@ ObjectBuilder shape(const std::string& type, PbrtParameters& p, const PbrtPlacem
   return result;
 }
 
-/// Indices in groups of `width`; nothing after an error.
+/// Indices in groups of `width`; empty after an error.
 std::vector<double> read_indices(PbrtParameters& p, size_t n_vertices, size_t width) {
   std::vector<double> indices = p.get_array("indices", "integer", width);
   if (indices.empty() && !p.has("indices") && n_vertices == width)
@@ -39,7 +39,7 @@ ObjectBuilder mesh_shape(PbrtParameters& p, const PbrtPlacement& placement, Embe
   return result;
 }
 
-/// Positions and what stands at each of them.
+/// Positions and per-vertex attributes.
 std::optional<EmbeddedMesh> read_vertices(PbrtParameters& p) {
   EmbeddedMesh mesh;
   mesh.positions = p.get_array("P", "point3", 3);
@@ -68,7 +68,7 @@ ObjectBuilder triangle_mesh(PbrtParameters& p, const PbrtPlacement& placement) {
   return mesh_shape(p, placement, std::move(*mesh), smooth);
 }
 
-/// Patches that are parallelograms: two triangles of each, with a quarter of the unit square at each corner.
+/// Patches that are parallelograms: two triangles each, with (u, v) covering the unit square.
 ObjectBuilder bilinear_mesh(PbrtParameters& p, const PbrtPlacement& placement) {
   const std::optional<EmbeddedMesh> given = read_vertices(p);
   p.ignore({"faceIndices"});
@@ -106,7 +106,7 @@ ObjectBuilder bilinear_mesh(PbrtParameters& p, const PbrtPlacement& placement) {
   return mesh_shape(p, placement, std::move(mesh), smooth);
 }
 
-/// Parts of quadrics are not supported: the parameter must have the value of the whole.
+/// Partial quadrics are not supported: the parameter must have the value of the whole.
 void expect_whole(PbrtParameters& p, const char* name, double whole) {
   const double value = p.get_float(name, whole);
   if (std::abs(value - whole) > 1e-4 * std::max(std::abs(whole), 1.0))

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers, colours and textures of pbrt's scene files.
+// Numbers, colours and textures in pbrt scene files.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ ObjectPtr find_texture(PbrtParameters& p, const PbrtParameter& parameter, const 
   return nullptr;
 }
 
-/// Wavelengths and values in turn.
+/// Alternating wavelengths and values.
 std::optional<SampledSpectrum> sampled(PbrtParameters& p, const PbrtParameter& parameter) {
   std::vector<double> wavelengths, values;
   for (size_t i = 0; i < parameter.numbers.size(); ++i) (i % 2 ? values : wavelengths).push_back(parameter.numbers[i]);
@@ -42,7 +42,7 @@ std::optional<ColourValue> rgb(PbrtParameters& p, const PbrtParameter& parameter
   return std::nullopt;
 }
 
-/// pbrt's mapping of (u, v), then `more`.
+/// pbrt's mapping of (u, v), followed by `more`.
 Transform texture_mapping(PbrtParameters& p, const Transform& more) {
   if (const std::string mapping = p.get_string("mapping", "uv"); mapping != "uv")
     p.error(fmt::format("has the mapping '{}'; supported: 'uv'", mapping));
@@ -59,7 +59,7 @@ Transform texture_mapping(PbrtParameters& p, const Transform& more) {
 
 ObjectBuilder image_texture(PbrtParameters& p) {
   auto bitmap = make_object("texture", "bitmap", p.where(), {{"filename", p.get_string("filename", "")}});
-  // pbrt's v = 0 is the lower edge of the picture.
+  // pbrt's v = 0 is the bottom of the image.
   const Transform flip = Transform::translate({0, 1, 0}) * Transform::scale({1, -1, 1});
   set_property(*bitmap, "to_uv", texture_mapping(p, flip));
   const std::string wrap = p.get_string("wrap", "repeat"), filter = p.get_string("filter", "bilinear");
@@ -79,7 +79,7 @@ ObjectBuilder image_texture(PbrtParameters& p) {
   return make_object("texture", "scale", p.where(), {{"scale", scale}, {"", ObjectPtr(bitmap)}});
 }
 
-/// A texture parameter of a texture: a number, a colour or another texture.
+/// A texture's input: a number, a colour or another texture.
 std::optional<Value> either(PbrtParameters& p, const std::string& name, double fallback, bool of_numbers,
                             const PbrtNames& names) {
   if (of_numbers) return float_value(p, name, fallback, names);
@@ -90,7 +90,7 @@ std::optional<Value> either(PbrtParameters& p, const std::string& name, double f
 ObjectBuilder checkerboard(PbrtParameters& p, bool of_numbers, const PbrtNames& names) {
   if (p.get_integer("dimension", 2) != 2) p.error("has three dimensions; supported: two");
   auto board = make_object("texture", "checkerboard", p.where());
-  // Squares of pbrt have the length 1, those here 1/2.
+  // pbrt's squares have side 1, ours 1/2.
   set_property(*board, "to_uv", texture_mapping(p, Transform::scale({0.5f, 0.5f, 1})));
   const auto first = either(p, "tex1", 1, of_numbers, names), second = either(p, "tex2", 0, of_numbers, names);
   if (!first || !second) return nullptr;

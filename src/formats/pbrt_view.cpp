@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lights of pbrt-v4, and what stands before WorldBegin: camera, film, filter, sampler, integrator.
+// Lights of pbrt-v4, and the directives before WorldBegin: camera, film, filter, sampler, integrator.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,9 +10,9 @@
 namespace covary {
 namespace {
 
-constexpr float kLensDistance = 1e6f;  // pbrt's default focus
+constexpr float kLensDistance = 1e6f;  // pbrt's default focal distance
 
-/// Directions that pbrt gives by two points.
+/// A direction that pbrt specifies by two points.
 struct Aim {
   Vec3 from, to;
 };
@@ -176,7 +176,7 @@ void read_pbrt_integrator(const std::string& type, PbrtParameters& p, PbrtView& 
   if (!bidirectional && type != "path" && type != "volpath")
     p.warn("is read as 'path': the expected picture is the same");
   view.integrator = make_object("integrator", bidirectional ? "bdpt" : "path", p.where());
-  // pbrt counts the surfaces on a path, here its edges count.
+  // pbrt counts scattering events on a path; here its edges count.
   set_property(*view.integrator, "max_depth", p.get_integer("maxdepth", 5) + 1);
   p.ignore({"regularize", "lightsampler", "visualizestrategies", "visualizeweights", "samplelights", "samplebsdf",
             "imagefile", "iterations", "photonsperiteration", "radius", "seed", "bootstrapsamples", "chains",
@@ -204,7 +204,7 @@ std::vector<ObjectPtr> finish_pbrt_view(PbrtView view, const SourceLocation& whe
     view.integrator = make_object("integrator", "path", where);
     set_property(*view.integrator, "max_depth", int64_t{6});
   }
-  // pbrt's cameras have x to the right, those here to the left.
+  // pbrt's camera space has x to the right, ours to the left.
   Transform flip = Transform::scale({-1, 1, 1});
   if (view.orthographic) {
     const auto size = [&](size_t i) { return static_cast<float>(std::get<int64_t>(view.film->properties[i].value)); };

@@ -9,14 +9,14 @@
 namespace covary {
 namespace {
 
-/// Objects that one may hold when every reference is followed: far above what scenes need.
+/// Limit on the objects that one may hold with every reference expanded: far above what scenes need.
 constexpr size_t kMaxExpanded = 4096;
 
 }  // namespace
 
 void resolve_references(const SceneObjects& objects, ObjectIds ids, const std::vector<SceneAlias>& aliases,
                         Diagnostics& diagnostics) {
-  // An alias may name another alias: repeat while something changes.
+  // An alias may name another alias: iterate until nothing changes.
   std::vector<SceneAlias> open = aliases;
   for (bool progress = true; progress && !open.empty();) {
     progress = false;
@@ -56,8 +56,8 @@ void resolve_references(const SceneObjects& objects, ObjectIds ids, const std::v
   }
 }
 
-// References can make long chains, and a few objects that hold each other twice stand for very many. Both are found
-// without recursion, and cut, so that everything later may follow references one by one.
+// References can form long chains, and a few objects that each hold another twice expand exponentially. Both are
+// detected without recursion and cut, so that later steps can follow references one by one.
 
 std::vector<ObjectDescription*> break_cycles(const SceneObjects& objects, Diagnostics& diagnostics) {
   std::unordered_map<const ObjectDescription*, ObjectDescription*> writable;
@@ -108,8 +108,8 @@ bool ExpansionLimit::add(const ObjectDescription& object) {
     whole.count += found->second.count;
     whole.depth = std::max(whole.depth, found->second.depth + 1);
   }
-  if (object.kind == "shape") whole.count = 1;  // a group may be large: shapes are looked at once
-  if (object.kind == "bsdf" && object.type == "twosided") whole.count = 2 * whole.count - 1;  // both sides look
+  if (object.kind == "shape") whole.count = 1;  // a group may be large: shapes are visited once
+  if (object.kind == "bsdf" && object.type == "twosided") whole.count = 2 * whole.count - 1;  // both sides are visited
   const bool too_deep = whole.depth > max_nesting_, accepted = !too_deep && whole.count <= kMaxExpanded;
   expanded_[&object] = accepted ? whole : Expanded{};
   if (accepted) return true;

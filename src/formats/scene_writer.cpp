@@ -17,7 +17,7 @@
 namespace covary {
 namespace {
 
-/// The shortest text that is read as the same float: numbers of scene files are read as doubles and then rounded.
+/// The shortest text that reads back as the same float: scene numbers are parsed as doubles and then rounded.
 std::string float_text(float value) {
   std::string text = fmt::format("{}", value);
   return static_cast<float>(parse_number(text)) == value ? text : fmt::format("{}", static_cast<double>(value));
@@ -80,12 +80,12 @@ class Writer {
     return object.kind != "emitter" && n_references_.at(&object) > 1;
   }
 
-  /// Lights that stand in the scene so that shapes refer to them.
+  /// Lights at top level that shapes reference.
   bool is_part_of_shapes(const ObjectDescription& object) const {
     return object.kind == "emitter" && n_references_.at(&object) > 1;
   }
 
-  /// Writes what several objects refer to at the top of the scene, once.
+  /// Writes objects referenced several times once, at the top of the scene.
   void define(const ObjectDescription& object) {
     if (ids_.contains(&object)) return;
     define_parts(object);
@@ -105,7 +105,7 @@ class Writer {
     }
   }
 
-  /// The object's own id where it has one that is not taken.
+  /// The object's own id if it has one that is still free.
   std::string new_id(const ObjectDescription& object) {
     const std::string stem = object.id.empty() ? object.kind : object.id;
     std::string id = object.id.empty() ? stem + "-1" : stem;
@@ -179,7 +179,7 @@ class Writer {
     }
   }
 
-  /// A file of this content; its name.
+  /// Adds a file with this content; returns its name.
   std::string add_file(const std::string& bytes) {
     std::string_view content = bytes;
     const char* extension = bytes.starts_with("ply")                             ? ".ply"

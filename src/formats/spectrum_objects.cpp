@@ -8,7 +8,7 @@
 namespace covary {
 namespace {
 
-/// Spectra hold numbers only.
+/// For spectra, which have no nested objects.
 class NoObjects final : public ObjectFactory {
  public:
   std::shared_ptr<const SceneObject> make(const ObjectPtr&) override { return nullptr; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names and parameters of Mitsuba 0.x files in today's terms (docs/scene-format.md lists them).
+// Converts names and parameters of Mitsuba 0.x files to current ones (listed in docs/scene-format.md).
 #include "formats/upgrade.h"
 
 #include <fmt/format.h>
@@ -29,7 +29,7 @@ void rename(ObjectDescription& object, std::string_view from, const std::string&
   if (Property* property = find(object, from)) property->name = to;
 }
 
-/// The number of the property, if it is one.
+/// The property's number, if it is one.
 std::optional<double> number(const Property* property) {
   if (!property) return std::nullopt;
   if (const double* value = std::get_if<double>(&property->value)) return *value;
@@ -73,7 +73,7 @@ void upgrade_bitmap(ObjectDescription& object) {
   remove(object, "cache");
 }
 
-/// eta and k were divided by the index outside; only "air" is needed in practice.
+/// eta and k were divided by the external index; in practice only "air" occurs.
 void upgrade_conductor(ObjectDescription& object) {
   Property* const outside = find(object, "ext_eta");
   if (!outside) return;

@@ -9,7 +9,7 @@
 namespace covary {
 namespace {
 
-/// What a file is that was taken for a scene; "" when that does not show.
+/// Recognises other file types mistaken for a scene; "" if unknown.
 std::string kind_of_file(std::string_view text) {
   if (text.starts_with("v/1\1")) return "an EXR image";
   if (text.starts_with("\x89PNG")) return "a PNG image";
@@ -36,7 +36,7 @@ XmlDocument::XmlDocument(std::string_view text, const std::string& name, Diagnos
     diagnostics.error({name_, 1, 1}, "the file is " + kind + "; expected a scene in XML");
     return;
   }
-  // In place and without conversion: offsets into the buffer are offsets into the file.
+  // Parsed in place and without conversion, so that offsets into the buffer are offsets into the file.
   const pugi::xml_parse_result result =
       document_.load_buffer_inplace(buffer_.data(), buffer_.size(), pugi::parse_default, pugi::encoding_utf8);
   if (!result) {
@@ -54,7 +54,7 @@ SourceLocation XmlDocument::at(size_t offset) const {
 }
 
 SourceLocation XmlDocument::where(pugi::xml_node element) const {
-  const ptrdiff_t offset = element.offset_debug();  // of the tag's name
+  const ptrdiff_t offset = element.offset_debug();  // of the tag name
   return at(static_cast<size_t>(std::max<ptrdiff_t>(offset - 1, 0)));
 }
 
@@ -82,7 +82,7 @@ std::string undefined_parameter(const std::string& name, const std::vector<std::
 }  // namespace
 
 std::string XmlDefines::substitute(std::string_view text) {
-  // A few nested defaults could otherwise grow without bound, and many attributes with them.
+  // Nested defaults could otherwise grow without bound, and many attributes with them.
   constexpr size_t kLongest = size_t{1} << 20, kAll = size_t{1} << 24;
   std::string result;
   for (size_t i = 0; i < text.size();) {

@@ -82,7 +82,7 @@ Property PropertyReader::read(const XmlDocument& document, pugi::xml_node node) 
     }
     return {name, std::move(value), where};
   } catch (const Error& error) {
-    // The empty message: already recorded. The null object keeps the parameter known but without a value.
+    // An empty message means it was already recorded. The null object keeps the parameter known, but without a value.
     if (*error.what() != '\0')
       diagnostics_.error(where, name.empty() ? error.what() : fmt::format("'{}': {}", name, error.what()));
     return {name, ObjectPtr(), where};

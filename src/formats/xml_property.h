@@ -11,24 +11,24 @@
 
 namespace covary {
 
-/// The elements that can stand inside <transform>.
+/// Elements allowed inside <transform>.
 const std::vector<std::string>& transform_tags();
 
-/// Reads the elements that hold one value: numbers, texts, points, colours, spectra and transforms.
+/// Reads elements that hold one value: numbers, strings, points, colours, spectra and transforms.
 class PropertyReader {
  public:
   PropertyReader(XmlDefines& defines, FileResolver& files, Diagnostics& diagnostics)
       : defines_(defines), files_(files), diagnostics_(diagnostics) {}
 
-  /// The property `node` describes. After recording an error its value is a null ObjectPtr, which keeps the parameter
-  /// known, but without a value.
+  /// The property described by `node`. After recording an error its value is a null ObjectPtr, which keeps the
+  /// parameter known, but without a value.
   Property read(const XmlDocument& document, pugi::xml_node node);
 
  private:
   Value read_spectrum(const XmlAttributes& attributes, const SourceLocation& where);
-  /// The product of the operations, the first applied first. Invalid ones are recorded and left out.
+  /// The product of the operations, the first one applied first. Invalid ones are recorded and skipped.
   Transform read_transform(const XmlDocument& document, pugi::xml_node node);
-  /// Its <transform time="…">, by which to_world moves.
+  /// Reads <transform time="…"> children, which animate to_world.
   Value read_animation(const XmlDocument& document, pugi::xml_node node);
   Transform read_operation(pugi::xml_node node, const std::string& tag, const SourceLocation& where);
 

@@ -20,7 +20,7 @@ namespace covary {
 namespace fs = std::filesystem;
 namespace {
 
-// Limits far above what scenes need, and low enough that no small file takes long or much memory.
+// Limits far above what scenes need, but low enough that no small file takes long or much memory.
 constexpr int kMaxIncludeDepth = 15;
 constexpr int kMaxIncludes = 1000;
 constexpr size_t kMaxTextBytes = size_t{1} << 28;  // of all files together
@@ -70,9 +70,10 @@ class Reader {
  private:
   struct Document {
     XmlDocument xml;
-    bool old;  // of version 0.x or 1.x
+    bool old;  // version 0.x or 1.x
   };
-  /// A limit was passed: reading ends at once, because going on would take the time and memory that the limit is for.
+  /// Thrown when a limit is exceeded: reading stops at once, since going on would take the time and memory that it
+  /// guards.
   struct Stop {};
 
   [[noreturn]] void stop(const SourceLocation& where, const std::string& message) {
@@ -102,13 +103,13 @@ class Reader {
     document.old = read_version(root, where) < 2;
     if (depth > 0 && std::string_view(root.name()) == "scene") {
       check_root_attributes(root, where);
-      read_children(document, root, parent, depth, 0);  // as if the content stood in place of <include>
+      read_children(document, root, parent, depth, 0);  // as if the content replaced <include>
     } else {
       read_object(document, root, parent, depth, 0, true);
     }
   }
 
-  /// Major version of the file format; the newest after an error.
+  /// Major version of the file format; the newest one after an error.
   int read_version(pugi::xml_node root, const SourceLocation& where) {
     const pugi::xml_attribute attribute = root.attribute("version");
     if (!attribute) {
@@ -220,11 +221,11 @@ class Reader {
     }
     read_children(document, node, *object, depth, nesting);
     if (document.old) upgrade_object(*object, diagnostics_);
-    // An object without a type was reported; whoever asks for it must not report it again.
+    // A missing type was reported; users of the object must not report it again.
     add(parent, {attributes.get("name"), attributes.complete() ? ObjectPtr(object) : ObjectPtr(), where});
   }
 
-  /// Everything that is not an object.
+  /// Reads anything that is not an object.
   void read_property(const Document& document, pugi::xml_node node, ObjectDescription& owner) {
     const std::string tag = node.name();
     const SourceLocation where = document.xml.where(node);
@@ -256,7 +257,7 @@ class Reader {
     } else if (tag == "ref") {
       const XmlAttributes attributes(node, where, defines_, {"!id", "name"}, diagnostics_);
       if (!attributes.complete()) return;
-      auto reference = std::make_shared<ObjectDescription>();  // stands in until everything is read
+      auto reference = std::make_shared<ObjectDescription>();  // placeholder until everything is read
       reference->kind = "ref", reference->id = attributes.get("id"), reference->where = where;
       add(owner, {attributes.get("name"), ObjectPtr(reference), where});
     } else {
@@ -277,11 +278,11 @@ class Reader {
     if (fs::is_directory(folder, ignored)) {
       files_.add_folder(folder.string());
     } else {
-      diagnostics_.warn(where, fmt::format("folder '{}' not found", folder.string()));  // an error where a file is not
+      diagnostics_.warn(where, fmt::format("folder '{}' not found", folder.string()));  // a missing file is an error
     }
   }
 
-  /// Appends a property; false when its name is taken.
+  /// Appends a property; false if its name is already used.
   bool add(ObjectDescription& owner, Property property) {
     if (!property.name.empty())
       for (const Property& other : owner.properties)
@@ -294,7 +295,7 @@ class Reader {
     return true;
   }
 
-  /// <spectrum type="…"> objects become plain values wherever they are used.
+  /// Replaces <spectrum type="…"> objects by plain values wherever they are used.
   void evaluate_spectra() {
     for (const auto& object : objects_) {
       for (Property& property : object->properties) {

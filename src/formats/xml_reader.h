@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Mitsuba XML -> ObjectDescription trees: parameters substituted, includes read, references resolved, files of version
-// 0.x and 1.x upgraded (upgrade.h). The meaning of the objects is not decided here.
+// 0.x and 1.x upgraded (upgrade.h). Objects are not interpreted here.
 #pragma once
 
 #include <map>
@@ -13,14 +13,14 @@
 namespace covary {
 
 struct SceneXml {
-  /// The <scene> element; its properties are the objects of the scene in file order. Null when the XML is malformed.
+  /// The <scene> element; its properties are the objects of the scene in file order. Null if the XML is malformed.
   std::shared_ptr<const ObjectDescription> scene;
-  /// Over the text of every XML file read and the defines.
+  /// Hash of the text of all XML files read, and of the defines.
   uint64_t hash = 0;
 };
 
-/// Reads the XML `text` and every file it includes. `name` stands for the text in messages, and its folder is searched
-/// first for files. Problems go to `diagnostics`; `files` gets the folders in which the scene's files are searched.
+/// Reads the XML `text` and every file it includes. `name` is used as its file name in messages, and its folder is
+/// searched first for files. Problems go to `diagnostics`; search folders of the scene's files are added to `files`.
 SceneXml read_scene_xml(std::string_view text, const std::string& name,
                         const std::map<std::string, std::string>& defines, FileResolver& files,
                         Diagnostics& diagnostics);

@@ -16,7 +16,7 @@ using test_support::contains;
 using test_support::message_of;
 using test_support::TemporaryFolder;
 
-/// A scene read from text, with all that was wrong in `errors`.
+/// A scene read from text, with all errors in `errors`.
 struct Read {
   SceneXml xml;
   std::string errors;
@@ -461,7 +461,7 @@ TEST(XmlReader, TurnsOldNamesIntoTodays) {
   EXPECT_EQ(value<double>(r, "int_ior"), 1);
   EXPECT_EQ(value<double>(r, "alpha_u"), 1);
   EXPECT_EQ(value<double>(r, "already_new"), 1);
-  // Files of today are taken as they are.
+  // Current files are not upgraded.
   EXPECT_EQ(value<double>(read_scene("<bsdf type=\"x\"><float name=\"intIOR\" value=\"1\"/></bsdf>"), "intIOR"), 1);
 }
 
@@ -481,7 +481,7 @@ TEST(XmlReader, TurnsOldTextureParametersIntoTodays) {
   EXPECT_EQ(child(r, 1).properties.size(), 0u);
   EXPECT_EQ(child(r, 2).properties[0].name, "reflectance");
   EXPECT_EQ(child(r, 3).properties.size(), 0u);
-  EXPECT_EQ(child(r, 4).properties[0].name, "ext_eta");  // kept: nothing today means the same
+  EXPECT_EQ(child(r, 4).properties[0].name, "ext_eta");  // kept: it has no current equivalent
 }
 
 TEST(XmlReader, WarnsAboutWhatItDropsFromOldFiles) {
