@@ -13,12 +13,12 @@
 namespace covary {
 namespace {
 
-/// What changes the picture and is read.
+/// Supported extensions that affect the image.
 constexpr std::array kRead = {"KHR_lights_punctual",  "KHR_materials_clearcoat",    "KHR_materials_emissive_strength",
                               "KHR_materials_ior",    "KHR_materials_transmission", "KHR_materials_unlit",
                               "KHR_materials_volume", "KHR_mesh_quantization",      "KHR_texture_transform"};
 
-/// Images are decoded when they are needed.
+/// Images are decoded on demand.
 bool keep_encoded(tinygltf::Image* image, const int, std::string*, std::string*, int, int, const unsigned char* bytes,
                   int size, void*) {
   image->image.assign(bytes, bytes + size);
@@ -32,7 +32,7 @@ std::string first_line(std::string text) {
   return text;
 }
 
-/// One number of the component type at `from`.
+/// Reads one number of component type `type` at `from`.
 double component(int type, bool normalized, const unsigned char* from) {
   const auto read = [&]<typename T>(T value) {
     std::memcpy(&value, from, sizeof(T));
@@ -74,7 +74,7 @@ GltfFile::GltfFile(std::string_view bytes, const std::string& name, FileResolver
                ? loader.LoadBinaryFromMemory(&model_, &problem, &warning,
                                              reinterpret_cast<const unsigned char*>(bytes.data()), size, folder)
                : loader.LoadASCIIFromString(&model_, &problem, &warning, bytes.data(), size, folder);
-  } catch (const std::exception& error) {  // of the JSON library
+  } catch (const std::exception& error) {  // from the JSON library
     problem = error.what();
   }
   if (!read || !problem.empty())

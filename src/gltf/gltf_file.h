@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A glTF 2.0 file as tinygltf reads it, and its problems.
+// A glTF 2.0 file read with tinygltf, and its diagnostics.
 #pragma once
 
 #include <tiny_gltf.h>
@@ -22,15 +22,15 @@ class GltfFile {
   const tinygltf::Model& model() const { return model_; }
   const SourceLocation& where() const { return where_; }
   void error(const std::string& message);
-  /// Another file that is read, for the hash of the scene; an error if it is missing.
+  /// Registers another file that is read, for the hash of the scene; an error if it is missing.
   void reads(const std::string& uri);
-  /// Each message is given once.
+  /// Each message is reported once.
   void warn(const std::string& message);
 
-  /// The numbers of an accessor with `width` numbers per element; normalised integers are scaled to [-1, 1]. Empty
-  /// after an error, which names `what`.
+  /// The values of an accessor with `width` numbers per element; normalised integers are scaled to [0, 1] or [-1, 1].
+  /// Empty after an error, which names `what`.
   std::vector<double> numbers(int accessor, int width, const std::string& what);
-  /// The bytes of a part of a buffer; empty after an error.
+  /// The bytes of a buffer view; empty after an error.
   std::string_view bytes_of_view(int view, const std::string& what);
 
  private:
@@ -43,9 +43,9 @@ class GltfFile {
   std::set<std::string> warned_;
 };
 
-/// The file name in a URI: "%20" and the like are decoded.
+/// The file name in a URI, with percent-encoding decoded.
 std::string file_of_uri(const std::string& uri);
-/// An object of an extension; null where it is absent.
+/// An extension's object; null if absent.
 const tinygltf::Value* find_extension(const tinygltf::ExtensionMap& extensions, const std::string& name);
 double extension_number(const tinygltf::Value& extension, const std::string& name, double fallback);
 

@@ -95,7 +95,7 @@ ObjectPtr GltfMaterials::make(const tinygltf::Material& m) {
   const bool thin = model->type == "principledthin";
   const bool solid_glass = std::any_of(model->properties.begin(), model->properties.end(),
                                        [](const Property& p) { return p.name == "spec_trans"; });
-  if (!thin && !solid_glass) {  // both sides are seen
+  if (!thin && !solid_glass) {  // both sides are visible
     auto sides = make_object("bsdf", "twosided", file_.where(), {{"", with_normals(m, model)}});
     model = sides;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Materials of glTF: metallic-roughness as `principled`, with textures, opacity, normals and emission.
+// glTF materials: metallic-roughness as `principled`, with textures, opacity, normal maps and emission.
 #pragma once
 
 #include <map>
@@ -17,11 +17,11 @@ class GltfMaterials {
   explicit GltfMaterials(GltfFile& file);
   ~GltfMaterials();
 
-  /// The reflectance model of a material; that of glTF's default one for -1.
+  /// The reflectance model of a material; glTF's default for -1.
   ObjectPtr model(int material);
-  /// The light that surfaces of the material emit; null if none.
+  /// The emission of surfaces with this material; null if none.
   ObjectPtr light(int material);
-  /// The set of texture coordinates that all its textures use.
+  /// The set of texture coordinates used by all its textures.
   int texture_set(int material);
 
  private:

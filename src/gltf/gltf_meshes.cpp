@@ -8,7 +8,7 @@
 namespace covary {
 namespace {
 
-/// Corners of triangles, three each, from the order of vertices in a strip or fan.
+/// Triangle indices, three each, from the vertex order of a list, strip or fan.
 std::vector<double> triangles_of(const std::vector<double>& order, int mode) {
   if (mode == TINYGLTF_MODE_TRIANGLES) return order;
   std::vector<double> corners;
@@ -21,7 +21,7 @@ std::vector<double> triangles_of(const std::vector<double>& order, int mode) {
   return corners;
 }
 
-/// The numbers of an attribute with one entry a vertex; empty where it is absent, nullopt after an error.
+/// An attribute with one element per vertex; empty if absent, nullopt after an error.
 std::optional<std::vector<double>> attribute(GltfFile& file, const tinygltf::Primitive& primitive, const char* name,
                                              int width, size_t n_vertices, const std::string& what) {
   const auto found = primitive.attributes.find(name);
@@ -36,7 +36,7 @@ std::optional<std::vector<double>> attribute(GltfFile& file, const tinygltf::Pri
   return values;
 }
 
-/// Corners of the triangles; empty after an error or a warning.
+/// Triangle indices; empty after an error or a warning.
 std::vector<double> read_corners(GltfFile& file, const tinygltf::Primitive& primitive, size_t n_vertices,
                                  const std::string& what) {
   std::vector<double> order(n_vertices);
@@ -81,7 +81,7 @@ std::optional<GltfMesh> read_gltf_mesh(GltfFile& file, const tinygltf::Primitive
   auto normals = attribute(file, primitive, "NORMAL", 3, n, what);
   auto uvs = attribute(file, primitive, fmt::format("TEXCOORD_{}", texture_set).c_str(), 2, n, what);
   if (!normals || !uvs) return std::nullopt;
-  for (size_t i = 1; i < uvs->size(); i += 2) (*uvs)[i] = 1 - (*uvs)[i];  // downwards in the file
+  for (size_t i = 1; i < uvs->size(); i += 2) (*uvs)[i] = 1 - (*uvs)[i];  // v points downwards in the file
   if (primitive.attributes.contains("COLOR_0")) file.warn(fmt::format("{}: colours of vertices are not read", what));
   if (!primitive.targets.empty()) file.warn(fmt::format("{}: is taken as it is before it is deformed", what));
   mesh.positions = std::move(*positions), mesh.normals = std::move(*normals), mesh.uvs = std::move(*uvs);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Meshes of glTF: triangles, strips and fans as shapes `ply`.
+// glTF meshes: triangles, strips and fans as shapes `ply`.
 #pragma once
 
 #include <optional>
@@ -15,8 +15,8 @@ struct GltfMesh {
   bool smooth = false;  ///< has normals
 };
 
-/// The triangles of a primitive with the texture coordinates of `texture_set`; nothing after an error, or if it has no
-/// triangles, which is a warning. Messages name it `what`.
+/// The triangles of a primitive with the texture coordinates of `texture_set`; nullopt after an error, or, with a
+/// warning, if it has no triangles. Messages call it `what`.
 std::optional<GltfMesh> read_gltf_mesh(GltfFile& file, const tinygltf::Primitive& primitive, int texture_set,
                                        const std::string& what);
 

@@ -16,13 +16,13 @@ namespace covary {
 namespace {
 
 constexpr size_t kMostObjects = 1000000;
-constexpr int64_t kHeight = 720, kMostWidth = 7200, kSamples = 64;  // the file tells the aspect alone
+constexpr int64_t kHeight = 720, kMostWidth = 7200, kSamples = 64;  // the file only gives the aspect ratio
 constexpr double kDegrees = 180 / M_PI;
 
-/// Cameras and lights look along -z in glTF, along +z here.
+/// glTF's cameras and lights look along -z, ours along +z.
 Transform about_face() { return Transform::scale({-1, 1, -1}); }
 
-/// What the node does to its children. Throws Error(kInput) for scales of 0 and the like.
+/// The node's local transformation. Throws Error(kInput) if it is singular.
 Transform transform_of(const tinygltf::Node& node) {
   Matrix4 m = Transform().matrix();
   if (node.matrix.size() == 16) {
@@ -48,7 +48,7 @@ Transform transform_of(const tinygltf::Node& node) {
   return Transform(m);
 }
 
-/// Without its scale.
+/// The transformation without its scale.
 Transform rigid(const Transform& t) {
   Matrix4 m = t.matrix();
   for (size_t k = 0; k < 3; ++k) {
@@ -108,7 +108,7 @@ class Reader {
     groups_.resize(model_.meshes.size());
   }
 
-  /// Visits the nodes of the scene, in the order of the file.
+  /// Visits the nodes of the scene in file order.
   void walk() {
     std::vector<bool> seen(model_.nodes.size());
     std::vector<Place> open;
@@ -127,7 +127,7 @@ class Reader {
       const tinygltf::Node& node = model_.nodes[place.node];
       try {
         const Transform to_world = place.to_world * transform_of(node);
-        // Whether it looks singular is asked of the 16 numbers.
+        // The test for singularity uses the 16 numbers.
         visit(node, place.to_world.is_identity() ? to_world : Transform(to_world.matrix()));
         push(node.children, to_world);
       } catch (const Error& error) {
@@ -248,7 +248,7 @@ class Reader {
     set_property(*sensor_, "to_world", to_world * about_face());
   }
 
-  /// From the front, a little from above and from the right.
+  /// From the front, slightly from above and from the right.
   void look_at_everything() {
     if (bounds_.empty()) {
       file_.error("the file has neither a camera nor a mesh");

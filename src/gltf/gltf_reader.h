@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of glTF 2.0 -> ObjectDescription trees, like those that Mitsuba's XML becomes (xml_reader.h).
+// glTF 2.0 files -> ObjectDescription trees, as from Mitsuba XML (xml_reader.h).
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace covary {
 
-/// Reads the file, JSON or binary, with its buffers and images; as read_scene_xml().
+/// Reads the file, JSON or binary, with its buffers and images; see read_scene_xml().
 SceneXml read_scene_gltf(std::string_view bytes, const std::string& name, FileResolver& files,
                          Diagnostics& diagnostics);
 

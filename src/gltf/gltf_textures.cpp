@@ -13,11 +13,11 @@
 namespace covary {
 namespace {
 
-/// Width and height of a PNG or JPEG picture, from its header; zeros where it is neither.
+/// Width and height of a PNG or JPEG image, from its header; zeros if it is neither.
 std::pair<int, int> size_of(const std::vector<unsigned char>& bytes) {
   const auto two = [&](size_t at) { return bytes[at] * 256 + bytes[at + 1]; };
   if (bytes.size() > 24 && bytes[0] == 0x89 && bytes[1] == 'P') {
-    if (two(16) > 0 || two(20) > 0) return {1 << 16, 1 << 16};  // more than is accepted
+    if (two(16) > 0 || two(20) > 0) return {1 << 16, 1 << 16};  // more than is supported
     return {two(18), two(22)};
   }
   if (bytes.size() < 4 || bytes[0] != 0xff || bytes[1] != 0xd8) return {0, 0};
@@ -35,8 +35,8 @@ std::string wrap_mode(int wrap) {
                                                          : "repeat";
 }
 
-/// Vertices have v upwards here, downwards in the file. KHR_texture_transform: rotation is counter-clockwise as seen in
-/// the picture.
+/// v points upwards at our vertices, downwards in the file. KHR_texture_transform: rotation is counter-clockwise as
+/// seen in the image.
 Transform uv_transform(const tinygltf::ExtensionMap& extensions) {
   const Transform flip = Transform::translate({0, 1, 0}) * Transform::scale({1, -1, 1});
   const tinygltf::Value* khr = find_extension(extensions, "KHR_texture_transform");
@@ -123,7 +123,7 @@ const GltfTextures::Pixels* GltfTextures::decoded(int index) {
   if (image.image.size() < n * step) return fail("cannot be decoded: it is damaged");
   pixels.channels = image.component;
   pixels.values.resize(n);
-  for (size_t i = 0; i < n; ++i) pixels.values[i] = image.image[i * step + step - 1];  // of 16 bits the upper ones
+  for (size_t i = 0; i < n; ++i) pixels.values[i] = image.image[i * step + step - 1];  // the high byte of 16 bits
   pixels.width = width, pixels.height = height;
   return &pixels;
 }
@@ -131,7 +131,7 @@ const GltfTextures::Pixels* GltfTextures::decoded(int index) {
 std::string GltfTextures::embedded(const Pixels& pixels, const GltfUse& use) const {
   const size_t n = static_cast<size_t>(pixels.width) * pixels.height;
   const bool one = use.kind == GltfUse::kChannel, plain = use.factor == Spectrum(1) || use.cutoff >= 0;
-  const auto value = [&](size_t i, int c) {  // grey pictures are the same in all channels, and opaque
+  const auto value = [&](size_t i, int c) {  // grey images: equal in all channels, opaque
     const int n_colours = pixels.channels < 3 ? 1 : 3;
     if (c == 3)
       return pixels.channels % 2 == 0 ? pixels.values[i * pixels.channels + pixels.channels - 1] : uint8_t{255};
@@ -148,7 +148,7 @@ std::string GltfTextures::embedded(const Pixels& pixels, const GltfUse& use) con
       }
     return text;
   }
-  // PFM: linear floats from the lowest row up.
+  // PFM: linear floats, bottom row first.
   std::string text = fmt::format("P{}\n{} {}\n-1.0\n", one ? 'f' : 'F', pixels.width, pixels.height);
   for (int y = pixels.height - 1; y >= 0; --y)
     for (int x = 0; x < pixels.width; ++x)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Textures of glTF as bitmaps. Images in separate files that are used unchanged stay there; others become part of the
-// description: a single channel, colours with a factor, images inside the file.
+// glTF textures as bitmaps. Images in separate files that are used unchanged stay there; others become part of the
+// description: single channels, colours with a factor, embedded images.
 #pragma once
 
 #include <cstdint>
@@ -13,16 +13,16 @@
 
 namespace covary {
 
-/// Which part of an image is used.
+/// How an image is used.
 struct GltfUse {
   enum Kind {
     kColour,   ///< sRGB, times `factor`
-    kVector,   ///< three linear channels as they are
+    kVector,   ///< three linear channels, unchanged
     kChannel,  ///< one linear channel, times factor.r
   } kind = kColour;
   int channel = 0;  ///< of kChannel; 3: alpha
   Spectrum factor{1};
-  double cutoff = -1;  ///< of kChannel: 1 from here on, otherwise 0; negative: none
+  double cutoff = -1;  ///< of kChannel: 1 from this value on, otherwise 0; negative: none
 };
 
 class GltfTextures {
