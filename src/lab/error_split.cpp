@@ -12,7 +12,7 @@
 namespace covary::lab {
 namespace {
 
-/// What does not change from render to render, per pixel and in double.
+/// The references, per pixel and in double: what does not change from render to render.
 class References {
  public:
   explicit References(std::span<const Image> images) : first_(images.front()), second_(images.back()) {
@@ -38,14 +38,14 @@ class References {
 enum Weight { kRelative, kAbsolute, kWeights };
 using PerWeight = std::array<double, kWeights>;
 
-/// Sum, and root of the sum of squares, of independent numbers with mean zero.
+/// Sum of independent numbers with mean zero, and the root of the sum of their squares.
 struct Lean {
   double sum = 0, squares = 0;
   void add(double t) { sum += t, squares += t * t; }
   double z() const { return squares > 0 ? sum / std::sqrt(squares) : 0; }
 };
 
-/// Mean of all renders where every render and the references are finite.
+/// Mean of all renders over the pixels where every render and the references are finite.
 struct MeanImage {
   std::vector<double> data;
   std::vector<char> finite;
@@ -66,7 +66,7 @@ MeanImage mean_image(std::span<const Image> renders, const References& reference
   return mean;
 }
 
-/// body(p, grey, weight) for each finite pixel p: the reference's grey value, and the weight of relative errors.
+/// Calls body(p, grey, weight) for each finite pixel p: the reference's grey value, and the weight of relative errors.
 template <typename Body>
 void for_each_pixel(const MeanImage& mean, const References& references, const Body& body) {
   for (size_t p = 0; p < mean.finite.size(); ++p) {
@@ -76,7 +76,7 @@ void for_each_pixel(const MeanImage& mean, const References& references, const B
   }
 }
 
-/// One render against mean and references: weighted sums over the finite pixels.
+/// One render against the mean and the references: weighted sums over the finite pixels.
 struct RenderSums {
   PerWeight error{}, around_mean{};  // (F_s - R1)(F_s - R2) and (F_s - F)^2
   double grey = 0;
@@ -102,7 +102,7 @@ RenderSums sums_of(const Image& render, const MeanImage& mean, const References&
   return sums;
 }
 
-/// The references' own part of the uncertainty and of the error.
+/// The references' contribution to the uncertainty and to the error.
 struct ReferenceSums {
   uint64_t n_pixels = 0;
   PerWeight error_squares{};  // of 2 (F - R)(R1 - R2)/2 per pixel
@@ -130,7 +130,7 @@ ReferenceSums reference_sums(const MeanImage& mean, const References& references
   return sums;
 }
 
-/// A further independent standard error.
+/// Adds a further independent standard error.
 Estimate widened(const Estimate& estimate, double standard_error) {
   if (!std::isfinite(estimate.standard_error) || estimate.standard_error <= 0) return estimate;
   const double factor = std::hypot(estimate.standard_error, standard_error) / estimate.standard_error;
@@ -149,7 +149,7 @@ SplitError split(const std::vector<double>& error, const std::vector<double>& ar
   double sum = 0;
   for (double c : around_mean) sum += c;
   const double variance = sum / (k - 1);
-  // Without render i the sum of squares around the mean of the others is smaller by k/(k-1) c_i.
+  // Without render i, the sum of squares around the mean of the others is smaller by k/(k-1) c_i.
   const auto variance_without = [&](size_t i) { return (sum - k / (k - 1) * around_mean[i]) / (k - 2); };
   const auto error_without = [&](size_t i) { return (k * result.error.value - error[i]) / (k - 1); };
   const size_t n_jackknife = n < 3 ? 0 : n;

@@ -7,8 +7,8 @@
 //     error         mean over s of <(F_s - R1)(F_s - R2)>
 //     variance      sum over s of <(F_s - F)^2> / (K - 1), F: mean of the renders
 //     squared bias  mean over pairs s != t of <(F_s - R1)(F_t - R2)> = error - variance
-// All three are unbiased; error and squared bias can come out negative. Standard errors: jackknife over the seeds, and
-// for error and squared bias the references' share, <2 (F - R)(R1 - R2)/2> squared pixel by pixel.
+// All three are unbiased; error and squared bias can be negative. Standard errors: jackknife over the seeds, plus, for
+// error and squared bias, the references' contribution, <2 (F - R)(R1 - R2)/2> squared pixel by pixel.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ namespace covary::lab {
 
 struct SplitError {
   Estimate error;                 ///< over seeds; no interval with one seed
-  Estimate squared_bias;          ///< from two seeds on; with interval from three on
+  Estimate squared_bias;          ///< needs two seeds; three for an interval
   Estimate variance;              ///< of one render; likewise
   std::vector<double> of_render;  ///< the error of each render
 };
@@ -37,14 +37,14 @@ struct ErrorSplit {
   /// relMSE of R itself: <(R1 - R2)^2 / 4>; far smaller errors cannot be resolved.
   double reference_error = 0;
   /// Standard normal if the renders share no more samples with one reference than with the other, and both references
-  /// are equally good: sum of (F - R)(R1 - R2) over its root of squares.
+  /// are equally good: sum of (F - R)(R1 - R2) over the root of its sum of squares.
   double reference_lean = 0;
   /// The same for each render against the mean of the others, which unequal references do not affect; empty for K = 1.
   std::vector<double> reference_lean_of_render;
 };
 
-/// At least one render; one reference or two of the renders' size, linear RGB. With one reference, its noise counts as
-/// squared bias, and leaning cannot be tested. Throws Error(kInput) if sizes differ or no pixel is left.
+/// Needs at least one render, and one or two references of the same size, linear RGB. With one reference, its noise
+/// counts as squared bias, and leaning cannot be tested. Throws Error(kInput) if sizes differ or no pixel is left.
 ErrorSplit split_error(std::span<const Image> renders, std::span<const Image> references);
 
 /// Suspicious findings about a split, in sentences; empty if there are none. `unbiased`: the renders are expected to

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The split of errors on renders of known bias and variance: values, coverage of the intervals, and planted mistakes.
+// The split of errors for renders of known bias and variance: values, coverage of intervals, planted mistakes.
 #include "lab/error_split.h"
 
 #include <gtest/gtest.h>
@@ -16,15 +16,15 @@ namespace {
 
 using test_support::contains, test_support::message_of;
 
-/// A made-up scene: brightness 0.5 to 1.5 across the image, noise that grows with brightness and differs per pixel.
+/// A synthetic scene: brightness 0.5 to 1.5 across the image; noise grows with brightness and differs per pixel.
 struct Synthetic {
   int size = 24;
   double bias = 0;     ///< added to every value
-  double sigma = 0.2;  ///< of one render, times brightness
-  double clamp = 1e9;  ///< values above it are cut off
+  double sigma = 0.2;  ///< standard deviation of one render, times brightness
+  double clamp = 1e9;  ///< values are clamped to this
 
   double clean(size_t i) const { return 0.5 + static_cast<double>(i / 3 % size) / size; }
-  /// Uniform noise of the given stream; equal streams are equal noise.
+  /// Uniform noise of the given stream; equal streams have equal noise.
   static double noise(uint64_t stream, size_t i) {
     return std::sqrt(12.0) * (PathRandom(Sampling::kIndependent, stream, 0, i, 0).get_1d(0, Event::kPixel) - 0.5);
   }
@@ -85,12 +85,12 @@ TEST(ErrorSplit, AgreesWithTheMetrics) {
   EXPECT_TRUE(std::isnan(split.relative.error.low));
 }
 
-// The split of MSE; in relMSE the weights hold the references' noise, too, which matters only where references are bad.
-// N = 300 experiments of K = 8 renders. Each interval must hold the true value in 95 % of them: binomial standard
-// deviation 1.26 %. alpha = 1e-5 in all (six comparisons, |z| < 4.8): within 6 %; a true coverage of 87 % or less is
-// found with power 0.84. The means over the experiments: relative standard deviation of the variance 0.9 / sqrt(7 *
-// 1728 * 300) = 0.05 %; of the squared bias with v = 0.043 and r = 0.011: sqrt(2 (v/K + r)^2 + 4 b^2 (v/K + r)) /
-// sqrt(1728 * 300) < 3.7e-5.
+// The split of MSE; for relMSE the weights contain the references' noise, too, which only matters if references are
+// bad. N = 300 experiments of K = 8 renders. Each interval must contain the true value in 95 % of them: binomial
+// standard deviation 1.26 %. alpha = 1e-5 in total (six comparisons, |z| < 4.8): within 6 %; a true coverage of 87 % or
+// less is detected with power 0.84. Means over the experiments: relative standard deviation of the variance 0.9 /
+// sqrt(7 * 1728 * 300) = 0.05 %; of the squared bias with v = 0.043 and r = 0.011: sqrt(2 (v/K + r)^2 + 4 b^2 (v/K +
+// r)) / sqrt(1728 * 300) < 3.7e-5.
 TEST(ErrorSplit, IntervalsHoldTheTruth) {
   constexpr int kExperiments = 300, kRenders = 8;
   for (const double bias : {0.0, 0.05}) {
@@ -121,7 +121,7 @@ TEST(ErrorSplit, NothingIsSuspiciousWhereAllIsRight) {
     EXPECT_TRUE(suspicions(split_of(renders_of(scene, 4, 1000 * i), scene.references(1000 * i + 500)), true).empty());
 }
 
-/// The sentences for K = 4 renders, some of which the test replaces.
+/// The suspicions for K = 4 renders, some of which the test replaces.
 std::string sentences(const std::vector<Image>& renders, const std::vector<Image>& references) {
   std::string all;
   for (const std::string& text : suspicions(split_of(renders, references), true)) all += text + "\n";
@@ -145,7 +145,7 @@ TEST(ErrorSplit, FindsReferencesOfTheRendersSeeds) {
     for (size_t i = 0; i < references[r].data.size(); ++i)
       references[r].data[i] = 0.5f * (references[r].data[i] + renders[2 * r + 1].data[i]);
   EXPECT_TRUE(contains(sentences(renders, references), "leans to the"));
-  // One seed in both: nothing leans, but the error goes below zero.
+  // One common seed: nothing leans, but the error becomes negative.
   EXPECT_TRUE(contains(sentences(renders_of(Synthetic{24, 0, 0.05}, 3, 500), scene.references(500)), "leans to the"));
 }
 
@@ -163,7 +163,7 @@ TEST(ErrorSplit, FindsTheReferenceOfAnotherScene) {
   EXPECT_TRUE(contains(sentences(renders_of(scene, 4, 0), references), "of the error is the same in all renders"));
 }
 
-// The clamp at 1.6 takes 0.9 % of the light of this scene.
+// Clamping at 1.6 loses 0.9 % of the light of this scene.
 TEST(ErrorSplit, FindsAOneSidedClamp) {
   Synthetic scene;
   const std::vector<Image> references = scene.references(500);

@@ -28,7 +28,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Guesses the time left from how long the runs took that were really done.
+/// Estimates the remaining time from the duration of the runs actually made.
 class Clock {
  public:
   void add_planned(double work) { work_left_ += work, ++runs_left_; }
@@ -52,13 +52,13 @@ std::string part_name(const Part& part) {
 
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
-/// What a command says, without its name before it.
+/// The error message of a command, without the command's name in front.
 std::string complaint(const std::string& message) {
   const std::string line = first_line(message), name = "covary: ";
   return line.starts_with(name) ? line.substr(name.size()) : line;
 }
 
-/// The program refused, and was not ended by a signal or a fault of its own.
+/// Whether the program reported an error, rather than being ended by a signal or an internal error.
 bool says_why(const RunFailure& failure) {
   return (failure.exit_code == 1 || failure.exit_code == 2) &&
          failure.message.find("internal error") == std::string::npos;
@@ -107,7 +107,8 @@ class Experiment {
     if (options_.progress) options_.progress({done_, total_, clock_.seconds_left(), what, kind});
   }
 
-  /// Size and hash of a scene, from the program itself: a scene that crashes the reader must not end the experiment.
+  /// Frame size and hash of a scene, as reported by the program: a scene that crashes the reader must not end the
+  /// experiment.
   void look_at(size_t index) {
     SceneInstance scene = located(results_.suite.scenes[index], options_.scenes_folder);
     report(Progress::Kind::kStarted, scene.entry.name + ", reading");
@@ -152,7 +153,7 @@ class Experiment {
     }
   }
 
-  /// Of the scene's runs those of the part. Runs that share passes have one seed and budget.
+  /// Keeps only the part's runs of the scene. Runs that share passes have the same seed and budget.
   void keep_part(size_t s) {
     const auto is_own = [this] { return piece_++ % options_.part.of == options_.part.number; };
     std::erase_if(references_[s], [&](const Run&) { return !is_own(); });
@@ -163,7 +164,7 @@ class Experiment {
     std::erase_if(runs_[s], [&](const Run& run) { return !own[cell(run)]; });
   }
 
-  /// A run from the cache or a new one.
+  /// The run's result, from the cache or a new run.
   std::optional<RunRecord> obtain(const Run& run, const std::string& what, RunFailure* failure) {
     std::optional<RunRecord> record = runner_.find(run);
     if (!record) {
@@ -280,7 +281,7 @@ class Experiment {
       }
   }
 
-  /// What errors of images depend on besides the image.
+  /// What errors of images depend on, apart from the image.
   std::string reference_identity(size_t s) const {
     const SceneResult& scene = results_.scenes[s];
     std::string text = options_.context.program_version;
@@ -292,7 +293,7 @@ class Experiment {
     return text;
   }
 
-  /// References that were given: what their files say that makes errors against them doubtful.
+  /// For references given as files: warns if their attributes make errors against them doubtful.
   void warn_of_given_references(size_t s) {
     const SceneResult& scene = results_.scenes[s];
     std::vector<ImageFacts> references;
@@ -305,7 +306,7 @@ class Experiment {
         found.push_back(scene.scene.entry.name + ": " + text);
     };
     if (references.size() == 2) add(references[0], references[1]);
-    std::set<size_t> seen;  // methods: all runs of one tell the same
+    std::set<size_t> seen;  // methods: all runs of one have the same warnings
     for (const Run& run : runs_[s])
       if (const auto record = records_.find(run.key); record != records_.end() && seen.insert(run.method).second)
         for (const ImageFacts& reference : references)
@@ -315,7 +316,7 @@ class Experiment {
     results_.warnings.insert(results_.warnings.end(), found.begin(), found.end());
   }
 
-  /// References that were given and tell their seeds must not share one with a run or with each other.
+  /// References given as files whose seeds are known must not share one with a run or with each other.
   void check_seeds(const SceneResult& scene) {
     if (scene.reference.files.size() == 2 && is_same_file(scene.reference.files[0], scene.reference.files[1]))
       throw Error(ErrorCode::kInput,
@@ -352,7 +353,7 @@ class Experiment {
     }
   }
 
-  /// One sentence a scene, about the method with the smallest error.
+  /// One warning per scene, for the method with the smallest error.
   void warn_of_noisy_references() {
     for (size_t s = 0; s < results_.scenes.size(); ++s) {
       const Cell* best = nullptr;
@@ -385,7 +386,7 @@ class Experiment {
   std::map<std::string, RunRecord> records_;         // by key
   Clock clock_;
   size_t done_ = 0, total_ = 0;
-  size_t piece_ = 0;  // of those that parts are made of, counted over all scenes
+  size_t piece_ = 0;  // index of the next unit of work to divide among parts, over all scenes
 };
 
 }  // namespace

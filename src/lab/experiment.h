@@ -18,9 +18,9 @@ struct Progress {
   enum class Kind { kStarted, kFailed } kind = Kind::kStarted;
 };
 
-/// A part of an experiment for one of several machines: number `number`, from 0, of `of` parts. The units that are
-/// divided are the halves of references, and the runs of all methods for each seed and budget (number_of_parts()). of
-/// == 0: the whole.
+/// A part of an experiment, for one of several machines: number `number`, counted from 0, of `of` parts. The units of
+/// division are halves of references, and the runs of all methods for one seed and budget (number_of_parts()). of == 0:
+/// the whole.
 struct Part {
   size_t number = 0, of = 0;
 };
@@ -28,12 +28,12 @@ struct Part {
 struct ExperimentOptions {
   std::string program;  ///< path of `covary`
   std::string cache_folder;
-  std::string scenes_folder;  ///< where the suite's scene files are searched
+  std::string scenes_folder;  ///< folder in which the suite's scene files are looked up
   PlanContext context;
   int64_t max_pixels = 0;  ///< > 0: frames are scaled down to this many pixels
   int threads = 0;         ///< of each render; 0: the default
   bool keep_passes = false;
-  Part part;                                ///< only this part's runs are made and kept, and nothing is measured
+  Part part;                                ///< makes and keeps only this part's runs, and measures nothing
   const std::atomic<bool>* stop = nullptr;  ///< stops after the run in progress has saved its state
   std::function<void(const Progress&)> progress;
 };

@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Characters of a text, counting lines as they are passed. Copies share the count.
+/// Iterates over a text's characters, counting lines. Copies share the count.
 class CountingIterator {
  public:
   using iterator_category = std::input_iterator_tag;
@@ -43,7 +43,7 @@ class CountingIterator {
   int* line_;
 };
 
-/// Receives the parser's events, builds the value and notes lines.
+/// Handles the parser's events: builds the value and records lines.
 class Builder : public nlohmann::json_sax<Json> {
  public:
   Builder(LocatedJson& document, const int& line) : document_(document), line_(line) {}
@@ -75,7 +75,7 @@ class Builder : public nlohmann::json_sax<Json> {
   [[noreturn]] void fail(int line, const std::string& text) const {
     throw Error(ErrorCode::kInput, fmt::format("{}:{}: {}", document_.name, line, text));
   }
-  /// Puts a value where it belongs and returns its place.
+  /// Inserts a value into the innermost container and returns its address.
   Json* place(Json value) {
     if (open_.empty()) {
       document_.value = std::move(value);
@@ -109,7 +109,7 @@ class Builder : public nlohmann::json_sax<Json> {
 
   LocatedJson& document_;
   const int& line_;
-  std::vector<Json*> open_;  // stay valid: a container grows only while it is the innermost
+  std::vector<Json*> open_;  // the addresses stay valid: a container only grows while it is the innermost
   std::vector<std::string> pointer_;
   std::string key_;
   int key_line_ = 0;
@@ -144,7 +144,7 @@ LocatedJson parse_located(const std::string& text, const std::string& name) {
 
 std::string shown(const Json& value) {
   constexpr size_t kMost = 60;
-  // All in ASCII, so that no character is cut in two.
+  // ASCII only, so that truncation cannot split a character.
   std::string text = value.dump(-1, ' ', true, Json::error_handler_t::replace);
   return text.size() > kMost ? text.substr(0, kMost - 3) + "..." : text;
 }
@@ -190,7 +190,7 @@ std::optional<double> ObjectReader::positive(const std::string& name) {
 
 std::optional<int64_t> ObjectReader::whole(const std::string& name, int64_t lowest, int64_t highest) {
   const auto is_in_range = [&](const Json& v) {
-    // Numbers above the largest int64_t are unsigned ones.
+    // Only integers above the largest int64_t are stored as unsigned.
     return v.is_number_integer() && (!v.is_number_unsigned() || std::in_range<int64_t>(v.get<uint64_t>())) &&
            v.get<int64_t>() >= lowest && v.get<int64_t>() <= highest;
   };

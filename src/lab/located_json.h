@@ -11,7 +11,7 @@
 namespace covary::lab {
 
 struct LocatedJson {
-  std::string name;  ///< of the file, for messages
+  std::string name;  ///< file name, for messages
   nlohmann::ordered_json value;
   std::map<std::string, int> lines;  ///< of each value by JSON pointer: "/scenes/0/file"; "" is the whole
 };

@@ -20,7 +20,7 @@
 namespace covary::lab {
 namespace {
 
-/// Errors of a run's image that are kept in the cache: the rest costs less than reading them.
+/// Errors of a run's image that are cached; recomputing the others is cheaper than reading them.
 constexpr std::pair<const char*, double RunResult::*> kKept[] = {
     {"relmse_trimmed", &RunResult::relmse_trimmed},
     {"mae", &RunResult::mae},
@@ -32,7 +32,7 @@ constexpr std::pair<const char*, double RunResult::*> kKept[] = {
     {"predicted_relmse_high", &RunResult::predicted_high},
 };
 
-/// The standard errors in the file; empty where it has none, or where another layer is looked at.
+/// The standard errors in the file; empty if there are none, or if another layer is measured.
 Image standard_errors(const std::string& path, const SceneInstance& scene) {
   const ImageInfo info = inspect_image(files_of(scene.frames, path).front());
   const bool has_errors = std::any_of(info.channels.begin(), info.channels.end(),
@@ -40,7 +40,7 @@ Image standard_errors(const std::string& path, const SceneInstance& scene) {
   return has_errors && scene.entry.layer.empty() ? read_window(path, scene, "StdError") : Image();
 }
 
-/// relMSE that standard errors predict, with the references in the denominator; none where there are none.
+/// relMSE predicted by the standard errors, with the references in the denominator; NaN if there are none.
 double predicted_relmse(const Image& errors, const std::vector<Image>& references) {
   if (errors.data.empty()) return kNone;
   double sum = 0;
@@ -57,8 +57,8 @@ double predicted_relmse(const Image& errors, const std::vector<Image>& reference
   return sum / static_cast<double>(n);
 }
 
-/// RunResult::coverage; none without standard errors. The reference's variance is (R1 - R2)^2 / 4, noisy as it is, so
-/// that it should be small.
+/// RunResult::coverage; NaN without standard errors. The reference's variance is estimated by (R1 - R2)^2 / 4, which is
+/// noisy, so it should be small.
 double coverage(const Image& image, const Image& errors, const std::vector<Image>& references) {
   if (errors.data.empty()) return kNone;
   constexpr double kNormal95 = 1.96;
@@ -77,7 +77,7 @@ double number_or_none(const nlohmann::json& json, const char* name) {
   return json.contains(name) && json[name].is_number() ? json[name].get<double>() : kNone;
 }
 
-/// Sets what kKept lists.
+/// Measures the values in kKept.
 void measure_image(const Image& image, const SceneInstance& scene, const std::vector<Image>& references,
                    const Cache& cache, const std::string& key, RunResult& run) {
   if (const std::optional<nlohmann::json> kept = cache.read_json("measures", key + ".json");
@@ -92,7 +92,7 @@ void measure_image(const Image& image, const SceneInstance& scene, const std::ve
   run.mae = error(Metric::kMae), run.flip = error(Metric::kFlip), run.above5 = error(Metric::kAbove5);
   run.predicted_relmse = predicted_relmse(std_error, references);
   run.coverage = coverage(image, std_error, references);
-  // What an image alone says of its relMSE; frames say it one by one.
+  // Bounds that a single image reports for its relMSE; those of frames are per frame.
   if (const std::vector<std::string> files = files_of(scene.frames, path); files.size() == 1 && !std_error.data.empty())
     if (const auto bounds = predicted_bounds(inspect_image(files[0])))
       run.predicted_low = (*bounds)[0], run.predicted_high = (*bounds)[1];
@@ -144,7 +144,7 @@ Estimate efficiency(const Cell& cell) {
                    [&](size_t i) { return 1 / (mean_without(errors, i) * mean_without(times, i)); });
 }
 
-/// Values of the runs of both cells that have the same seed.
+/// Values of the runs of both cells, paired by seed.
 template <typename Value>
 std::pair<std::vector<double>, std::vector<double>> in_pairs(const Cell& a, const Cell& b, Value&& value) {
   std::pair<std::vector<double>, std::vector<double>> result;
@@ -170,7 +170,7 @@ double published(const std::map<std::string, std::map<std::string, std::map<std:
   return b == m->second.end() ? kNone : b->second;
 }
 
-/// Error against samples over all budgets in samples, with the seeds that all of them have.
+/// Slope of error against samples over all budgets in samples, using the seeds common to all of them.
 Slope slope_of(const Results& results, size_t scene, size_t method) {
   std::vector<double> samples;
   std::vector<const Cell*> cells;
@@ -193,14 +193,14 @@ Slope slope_of(const Results& results, size_t scene, size_t method) {
 
 bool is_usable(const Estimate& e) { return e.value > 0 && std::isfinite(e.value); }
 
-/// An error above zero and ratios to the baseline. Unbiased estimates of small errors may be negative.
+/// Whether error and ratios to the baseline are positive; unbiased estimates of small errors may be negative.
 bool is_usable(const Results& results, size_t scene, size_t method, size_t budget) {
   const Cell* cell = results.find(scene, method, budget);
   return cell && is_usable(cell->split.relative.error) && is_usable(cell->equal_time) &&
          (results.suite.budgets[budget].spp == 0 || is_usable(cell->equal_sample));
 }
 
-/// The scenes that all summaries of a budget are about.
+/// Scenes that enter all summaries of a budget.
 std::vector<size_t> common_scenes(const Results& results, size_t budget) {
   const size_t n_scenes = results.scenes.size(), n_methods = results.suite.methods.size();
   std::vector<size_t> common;
@@ -251,7 +251,7 @@ std::optional<Summary> summary_of(const Results& results, const std::vector<size
   return summary;
 }
 
-/// Which scenes no summary of the budget is about, and because of which methods.
+/// Warns of scenes that enter no summary of the budget, naming the methods responsible.
 void warn_of_left_out(Results& results, const std::vector<size_t>& common, size_t budget) {
   const Suite& suite = results.suite;
   for (size_t s = 0; s < results.scenes.size(); ++s) {
@@ -338,7 +338,7 @@ void compare_cells(Results& results) {
       cell.temporal_gain = ratio(*base, cell, temporal);
       cell.worst = worst_regions(cell.frames, base->frames);
     }
-    // With a budget in seconds the errors themselves are those of equal times.
+    // With a budget in seconds, the errors themselves are at equal time.
     const Estimate errors = ratio(*base, cell, relmse);
     if (budget.seconds > 0) {
       cell.equal_time = errors;

@@ -8,9 +8,9 @@
 
 namespace covary::lab {
 
-/// Fills in everything about a cell that its own runs determine; their records and seeds are given. MAE and FLIP are
+/// Fills in everything about a cell that depends on its own runs; their records and seeds are given. MAE and FLIP are
 /// against the mean of the references. `unbiased`: see suspicions(). Errors of single images are cached under keys made
-/// of `run_keys`, one for each run, and `reference_key`.
+/// from `run_keys`, one per run, and `reference_key`.
 void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& references, bool unbiased,
              const Budget& budget, const Cache& cache, const std::vector<std::string>& run_keys,
              const std::string& reference_key);

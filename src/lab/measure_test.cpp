@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cells from images whose errors are known by hand, and what follows from several cells together.
+// Cells of images with errors known by hand, and quantities derived from several cells.
 #include "lab/measure.h"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ Image constant(float value) {
   return image;
 }
 
-/// Writes an image into the test's folder, with standard errors where they are given.
+/// Writes an image into the test's folder, optionally with standard errors.
 std::string write(const std::string& name, Image image, std::optional<float> std_error = {},
                   const ImagePlace& place = {kWidth, kHeight, {0, 0, kWidth, kHeight}},
                   const std::map<std::string, std::string>& attributes = {}) {
@@ -58,7 +58,7 @@ RunResult run_of(uint64_t seed, const std::string& image, double render_seconds,
 
 class Measure : public testing::Test {
  protected:
-  /// Two runs with values 1.2 and 1.1 where the references say 1: errors 0.04 and 0.01 before weighting.
+  /// Two runs with values 1.2 and 1.1 where the references are 1: errors 0.04 and 0.01 before weighting.
   Cell two_runs() {
     Cell cell;
     cell.runs = {run_of(1, write("one.exr", constant(1.2f), 0.3f), 2, 1),
@@ -78,7 +78,7 @@ TEST_F(Measure, ErrorsAndTimesAreThoseOfTheRuns) {
   EXPECT_NEAR(cell.runs[0].mse, 0.04, 1e-6);
   EXPECT_NEAR(cell.runs[1].relmse, 0.01 * kWeight, 1e-6);
   EXPECT_NEAR(cell.split.relative.error.value, 0.025 * kWeight, 1e-6);
-  // The seeds' mean is 1.15. Variance: sum of squares around it, over n - 1.
+  // The mean over seeds is 1.15. Variance: sum of squares around it, over n - 1.
   EXPECT_NEAR(cell.split.absolute.variance.value, 2 * 0.05 * 0.05, 1e-6);
   EXPECT_NEAR(cell.split.absolute.squared_bias.value, 0.2 * 0.1, 1e-6);
   EXPECT_NEAR(cell.runs[1].relmse_trimmed, 0.01 * kWeight, 1e-6);
@@ -164,7 +164,7 @@ TEST_F(Measure, ReadsTheLayerThatTheSceneNames) {
   EXPECT_NEAR(cell.runs[0].mae, 0.2, 1e-6) << "not that of the other layer";
 }
 
-/// Errors that cost more than reading the image are kept, one file a run and reference.
+/// Errors that take longer to compute than to read are cached, one file per run and reference.
 TEST_F(Measure, KeepsErrorsOfImages) {
   Cell cell = two_runs();
   measure_cell(cell);
@@ -253,7 +253,7 @@ TEST(CompareCells, RatiosAreAgainstTheBaselineWithTheSameBudget) {
   EXPECT_EQ(results.summaries[1].n_scenes, 1u);
 }
 
-/// With 48 samples where the baseline took 32, a third of the error is a half for equal samples.
+/// 48 samples against the baseline's 32: a third of the error is a half at equal samples.
 TEST(CompareCells, OtherNumbersOfSamplesAreNormalised) {
   Results results = two_methods({0.3, 0.36, 0.3}, {0.1, 0.12, 0.1});
   for (Cell& cell : results.cells) {
@@ -277,7 +277,7 @@ TEST(CompareCells, OtherNumbersOfSamplesAreNormalised) {
   EXPECT_FALSE(close.find(0, 1, 0)->equal_sample_normalised);
 }
 
-/// A run that failed leaves its seed out on both sides, and no ratio where nothing is left.
+/// A failed run removes its seed from both sides; if no seed is left, there is no ratio.
 TEST(CompareCells, MissingRunsLeaveGaps) {
   Results fewer = two_methods({0.3, 0.6, 0.3}, {0.1, 0.1});
   compare_cells(fewer);
@@ -288,7 +288,8 @@ TEST(CompareCells, MissingRunsLeaveGaps) {
   for (const Summary& summary : without.summaries) EXPECT_EQ(summary.method, 1u);
 }
 
-/// Three scenes; where one method's error came out negative, no row counts the scene, and its row says so.
+/// Three scenes; if one method's error is negative in a scene, no row includes that scene, and the method's row says
+/// so.
 TEST(CompareCells, RowsAverageTheSameScenes) {
   const Results one = two_methods({0.3, 0.36, 0.3}, {0.1, 0.12, 0.1});
   Results results = one;
@@ -298,7 +299,7 @@ TEST(CompareCells, RowsAverageTheSameScenes) {
     results.scenes.push_back(results.scenes[0]);
     for (Cell cell : one.cells) {
       cell.scene = s;
-      // Door: ten times the error of the baseline, and a negative one of the method at the first budget.
+      // Door: the baseline's error times ten, and a negative error of the method at the first budget.
       for (RunResult& run : cell.runs)
         if (s == 1) run.relmse *= cell.method == 0 ? 10 : (cell.budget == 0 ? -1 : 1);
       std::vector<double> errors;
@@ -320,7 +321,7 @@ TEST(CompareCells, RowsAverageTheSameScenes) {
   ASSERT_EQ(results.warnings.size(), 1u);
   EXPECT_TRUE(contains(results.warnings[0], "no summary at 24 spp counts door, where iicv has no positive error"));
 
-  // A method that is usable nowhere has a row that says so and takes no scene from the others.
+  // A method that is usable in no scene has a row that says so, and excludes no scene from the others.
   Results broken = one;
   for (Cell& cell : broken.cells)
     if (cell.method == 1)

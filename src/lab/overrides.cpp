@@ -13,7 +13,7 @@
 namespace covary::lab {
 namespace {
 
-/// Keeps the entries named; every name must exist.
+/// Keeps only the named entries; every name must exist.
 template <typename Entry>
 void keep(const char* what, const std::vector<std::string>& names, std::vector<Entry>& entries) {
   std::vector<std::string> known;
@@ -25,7 +25,7 @@ void keep(const char* what, const std::vector<std::string>& names, std::vector<E
   std::erase_if(entries, [&](const Entry& e) { return std::find(names.begin(), names.end(), e.name) == names.end(); });
 }
 
-/// The part of a crop around its middle that has kQuickCropPixels at most; anything else as it is.
+/// The centre of a crop, with at most kQuickCropPixels; anything else unchanged.
 std::string quick_crop(const std::string& crop) {
   const std::vector<int> size = whole_numbers(crop, 'x'), window = whole_numbers(crop, ',');
   const bool in_the_middle = size.size() == 2;
@@ -53,7 +53,7 @@ void make_quick(Suite& suite) {
   }
 }
 
-/// What can be told before the sizes of the scenes are known.
+/// Checks that need no scene sizes.
 void check_sizes(const Overrides& o) {
   if (!o.resolution.empty() && whole_numbers(o.resolution, 'x').size() != 2)
     throw Error(ErrorCode::kUsage, fmt::format("`resolution` '{}': expected WIDTHxHEIGHT", o.resolution));
@@ -85,7 +85,7 @@ void apply(const Overrides& o, Suite& suite) {
   }
   if (o.reference_spp) suite.reference = {*o.reference_spp, {}};
   if (!o.reference_files.empty()) suite.reference = {0, o.reference_files};
-  // Published values of methods that are left out have nothing to stand beside.
+  // Drops published values of methods that are left out.
   for (auto* table : {&suite.published_relmse, &suite.published_ratio})
     for (auto& [scene, methods] : *table)
       std::erase_if(methods, [&](const auto& entry) { return !suite.method(entry.first); });

@@ -94,7 +94,7 @@ Words SceneInstance::options() const {
   Words words;
   for (const std::string& define : entry.defines) words.insert(words.end(), {"-D", define});
   if (!entry.resolution.empty()) words.insert(words.end(), {"--resolution", entry.resolution});
-  // Always given, so that a crop in the scene file itself plays no part.
+  // Always given, so that a crop in the scene file has no effect.
   words.insert(words.end(), {"--crop", fmt::format("{},{},{},{}", window.x, window.y, window.width, window.height)});
   if (!frames.empty()) words.insert(words.end(), {"--frames", entry.frames});
   if (!camera_path.empty()) words.insert(words.end(), {"--camera-path", camera_path});
@@ -108,7 +108,7 @@ SceneInstance located(const SceneEntry& entry, const std::string& folder) {
   if (FrameRange range; read_frame_range(entry.frames, range)) scene.frames = range.numbers();
   if (entry.camera_path.empty()) return scene;
   scene.camera_path = (fs::path(folder) / entry.camera_path).string();
-  std::ifstream file(scene.camera_path);  // where it cannot be read, the render says so
+  std::ifstream file(scene.camera_path);  // if it cannot be read, the render reports it
   std::stringstream text;
   text << file.rdbuf();
   scene.hash = hash_text(hash_bytes(text.str()));
@@ -172,14 +172,14 @@ std::vector<Run> runs_of_scene(const Suite& suite, size_t index, const SceneInst
         run.work = budget.spp * static_cast<double>(scene.n_pixels());
         run.key = key_of("run", context, scene, {run.options, flattened(run.then)});
         run.timed = budget.seconds > 0;
-        // What a time budget renders depends on the method's speed: such passes belong to one run alone.
+        // With a time budget, the samples depend on the method's speed, so passes are not shared.
         run.passes_key = budget.spp ? key_of("passes", context, scene,
                                              {scene.options(), suite.common_options, amount, seed_words,
                                               context.pass_words(method.options)})
                                     : run.key;
         runs.push_back(std::move(run));
       }
-      // Runs that share passes side by side, in the order of the first of them.
+      // Makes runs that share passes adjacent, in the order of the first of them.
       for (auto at = runs.begin() + first; at != runs.end(); ++at)
         std::stable_partition(at, runs.end(), [&, key = at->passes_key](const Run& r) { return r.passes_key == key; });
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plans: which pixels, which command lines, which runs share what; and choices in place of a suite's own.
+// Plans: pixels, command lines, sharing of passes, and overrides of a suite's settings.
 #include "lab/plan.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ Suite two_methods() {
   return suite;
 }
 
-/// Names of estimators change nothing, other options change the passes.
+/// Names of estimators do not change the passes; other options do.
 std::vector<std::string> all_but_estimator(const std::vector<std::string>& options) {
   if (!options.empty() && options[0] == "--estimator") return {options.begin() + 2, options.end()};
   return options;
@@ -92,7 +92,7 @@ TEST(Plan, SeedsAreOutermost) {
   }
 }
 
-/// The passes that methods of these options get at one budget and seed, as numbers in order of appearance, by method.
+/// Which passes methods with these options use at one budget and seed, numbered in order of appearance.
 std::vector<int> sharing(const std::vector<std::vector<std::string>>& options, double seconds = 0) {
   Suite suite = two_methods();
   suite.methods.clear();
@@ -114,7 +114,7 @@ std::vector<int> sharing(const std::vector<std::vector<std::string>>& options, d
 TEST(Plan, RunsShareThePassesTheyHaveInCommon) {
   EXPECT_EQ(sharing({{}, {"--groups", "4"}, {"--estimator", "iduw"}, {"--estimator", "iduw", "--groups", "4"}}),
             (std::vector<int>{0, 1, 0, 1}));
-  // What fits into a time budget depends on the method.
+  // The number of samples in a time budget depends on the method.
   EXPECT_EQ(sharing({{}, {"--estimator", "iduw"}}, 10), (std::vector<int>{0, 1}));
 }
 

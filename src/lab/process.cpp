@@ -43,8 +43,8 @@ struct Pipe {
   }
 };
 
-/// Signals that end a program, held back while it lives: those that come between fork and exec must neither run the
-/// parent's handlers in the child nor be lost.
+/// Blocks the signals that end a program while the object lives: those that arrive between fork and exec must neither
+/// run the parent's handlers in the child nor be lost.
 class HeldSignals {
  public:
   HeldSignals() {
@@ -63,9 +63,8 @@ class HeldSignals {
   sigset_t before_{};
 };
 
-/// In the child, between fork and exec: only calls that are safe there. It leaves the terminal's group of processes:
-/// Ctrl-C there is for the parent, which passes it on once; a second signal would end the child before it has saved its
-/// work.
+/// Runs in the child between fork and exec: async-signal-safe calls only. Leaves the terminal's process group: the
+/// parent handles Ctrl-C and passes it on once; a second signal would end the child before it has saved its work.
 [[noreturn]] void become(char* const* arguments, int output, int errors, pid_t parent, const HeldSignals& held) {
   setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -80,7 +79,7 @@ class HeldSignals {
   _exit(127);
 }
 
-/// Forks; `run` is the child and does not return.
+/// Forks; `run` is executed in the child and does not return.
 pid_t start(const std::function<void(const HeldSignals&)>& run) {
   const HeldSignals held;
   const pid_t child = fork();
@@ -89,7 +88,7 @@ pid_t start(const std::function<void(const HeldSignals&)>& run) {
   return child;
 }
 
-/// Appends what can be read; false at the end of the stream.
+/// Appends available data; false at the end of the stream.
 bool read_some(int descriptor, std::string& text) {
   std::array<char, 4096> buffer{};
   const ssize_t n = read(descriptor, buffer.data(), buffer.size());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs one program as a child, so that its failure or crash does no harm.
+// Runs a program as a child process, so that its failure or crash does no harm.
 #pragma once
 
 #include <atomic>
@@ -19,8 +19,8 @@ struct ProcessResult {
   bool ok() const { return exit_code == 0; }
 };
 
-/// Runs `command` (path of the program, then its arguments) to its end. When *stop becomes true the child gets SIGINT
-/// once; Ctrl-C at the terminal does not reach it directly. The child is killed when the calling process dies, for
+/// Runs `command` (path of the program, then its arguments) until it ends. When *stop becomes true, the child gets
+/// SIGINT once; Ctrl-C in the terminal does not reach it directly. The child is killed if the calling process dies, for
 /// whatever reason. Throws Error(kIo) if no process can be started.
 ProcessResult run_process(const std::vector<std::string>& command, const std::atomic<bool>* stop = nullptr);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Child processes: what they write, how they end, and what becomes of them when this process is told to stop.
+// Child processes: their output, their exit, and what happens to them when this process is told to stop.
 #include "lab/process.h"
 
 #include <gtest/gtest.h>
@@ -51,8 +51,7 @@ TEST(Process, SaysThatAProgramCannotBeRun) {
   EXPECT_EQ(result.errors, "cannot run /nowhere/program");
 }
 
-/// Both pipes are emptied while the child runs: one that fills a pipe must not wait for ever. Of errors the end is
-/// kept.
+/// Both pipes are drained while the child runs: filling one must not deadlock. Only the end of standard error is kept.
 TEST(Process, TakesMoreThanAPipeHolds) {
   const ProcessResult result = shell("head -c 1000000 /dev/zero; head -c 1000000 /dev/zero >&2; echo last >&2");
   EXPECT_EQ(result.output.size(), 1000000u);
@@ -60,12 +59,12 @@ TEST(Process, TakesMoreThanAPipeHolds) {
   EXPECT_TRUE(result.errors.ends_with("last\n"));
 }
 
-/// Signals from a terminal go to its foreground group, in which the child is not.
+/// The child is not in the terminal's foreground group, to which its signals go.
 TEST(Process, IsAGroupOfItsOwn) {
   EXPECT_EQ(shell("test \"$(cut -d' ' -f5 /proc/$$/stat)\" = $$ && echo own").output, "own\n");
 }
 
-/// A signal that comes between fork and exec neither is lost nor runs the parent's handler in the child.
+/// A signal between fork and exec is not lost and does not run the parent's handler in the child.
 TEST(Process, IsInterruptedFromTheFirstMomentOn) {
   const std::atomic<bool> stop{true};
   const auto before = std::signal(SIGINT, [](int) {});
@@ -78,11 +77,11 @@ TEST(Process, HasNothingToRead) { EXPECT_EQ(shell("cat; echo end").output, "end\
 TEST(Process, InterruptsTheChildWhenToldToStop) {
   const std::atomic<bool> stop{true};
   const ProcessResult caught = shell("trap 'echo caught; exit 5' INT; while :; do sleep 0.05; done", &stop);
-  // The signal may come before the trap is set.
+  // The signal may arrive before the trap is set.
   EXPECT_TRUE((caught.exit_code == 5 && caught.output == "caught\n") || caught.signal == SIGINT) << caught.exit_code;
 }
 
-/// The child starts with default signals, whatever this process does with them.
+/// The child starts with default signal handlers, whatever this process does with them.
 TEST(Process, ChildrenCanBeInterruptedThoughTheParentIgnoresIt) {
   const auto before = std::signal(SIGINT, SIG_IGN);
   std::atomic<bool> stop{false};

@@ -119,7 +119,7 @@ const std::vector<std::string> kHowMeasured = {
     "which measures flicker and trails; temporal FLIP: |FLIP of successive frames − FLIP of those of the reference|; "
     "worst region: largest ratio of mean errors to the baseline's in any region."};
 
-/// Of a sequence, the last frame is shown.
+/// For a sequence, the last frame is shown.
 Image shown_image(const Image& pixels, const SceneInstance& scene) { return images_of(pixels, scene).back(); }
 
 Image mean_of_references(const SceneResult& result) {
@@ -198,7 +198,7 @@ Json report_document(const Results& results) {
 
 namespace {
 
-/// Summaries of a budget whose methods have as many scenes as any.
+/// Summaries of a budget's methods that include the largest number of scenes.
 std::vector<const Summary*> comparable(const Results& results, size_t budget) {
   size_t most = 0;
   for (const Summary& s : results.summaries)
@@ -210,7 +210,7 @@ std::vector<const Summary*> comparable(const Results& results, size_t budget) {
 }
 
 /// "At equal samples (192 spp) balanced has the least error: 8.1 times less than pt (7.0 to 9.4). Not clearly worse:
-/// error." Empty where nothing is better than the baseline for sure.
+/// error." Empty if nothing is significantly better than the baseline.
 std::string verdict(const Results& results, size_t budget, const std::string& condition, Estimate Summary::*ratio) {
   const Suite& suite = results.suite;
   const Summary* best = nullptr;
@@ -319,7 +319,7 @@ void add_pictures(const Results& results, Json& document, std::vector<ReportImag
   const std::string heading = fmt::format("Images, {}, seed {}", suite.budgets[budget].label(), suite.seeds[0]);
   Json section = new_section("images", heading);
   add_block(section, {{"type", "comparer"}, {"id", "images"}, {"scenes", scenes}});
-  // After the summary, before the numbers in detail.
+  // After the summary, before the detailed numbers.
   document["sections"].insert(document["sections"].begin() + 1, std::move(section));
 }
 

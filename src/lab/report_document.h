@@ -15,8 +15,8 @@ namespace covary::lab {
 nlohmann::ordered_json report_document(const Results& results);
 
 /// Appends the comparer to the document and its images to `images`: for each scene the reference (mean of its halves)
-/// and the first seed of each method at the budget that the suite shows, each with its FLIP. It opens on best_method()
-/// beside the baseline. Throws Error where an image cannot be read.
+/// and the first seed of each method at the budget that the suite shows, each with its FLIP. It opens with
+/// best_method() next to the baseline. Throws Error if an image cannot be read.
 void add_pictures(const Results& results, nlohmann::ordered_json& document, std::vector<ReportImage>& images);
 
 /// The method, other than the baseline, with the largest ratio to it at this budget (geometric mean over scenes; at

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the report says of results: tables with gaps, published values, failures, and texts that are odd.
+// Contents of the report: tables with gaps, published values, failures, unusual texts.
 #include "lab/report_document.h"
 
 #include <gtest/gtest.h>
@@ -188,7 +188,7 @@ TEST(ReportDocument, FailuresComeFirstWithCommandAndMessage) {
   EXPECT_EQ(block["items"][1], "room: no references");
 }
 
-/// Names, messages and titles are the user's: whatever they hold, the page says it as it is and stays whole.
+/// Names, messages and titles are the user's: the page shows them verbatim and stays intact.
 TEST(ReportDocument, OddTextsReachThePageUnchanged) {
   Results results = three_cells();
   Suite& suite = results.suite;

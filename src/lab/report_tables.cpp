@@ -41,7 +41,7 @@ bool any_cell(const Results& results, size_t budget, bool (*has)(const Cell&)) {
 
 bool every_cell(const Cell&) { return true; }
 
-/// Title of a method's column, with the samples that it took where that is not the budget.
+/// Heading of a method's column, with its number of samples if that differs from the budget.
 std::string method_title(const Results& results, size_t method, size_t budget) {
   const std::string& name = results.suite.methods[method].name;
   const double asked = results.suite.budgets[budget].spp;
@@ -51,13 +51,13 @@ std::string method_title(const Results& results, size_t method, size_t budget) {
   return name;
 }
 
-/// What a caption adds where ratios for equal samples are of errors at other numbers of samples.
+/// Note for captions if equal-sample ratios are normalised from errors at different numbers of samples.
 std::string normalised_note(const Results& results, size_t budget) {
   const bool any = any_cell(results, budget, [](const Cell& c) { return c.equal_sample_normalised; });
   return any ? "; if methods took different numbers of samples, equal samples: ratio of error × samples" : "";
 }
 
-/// Rows of the cells at a budget that `use` takes; scene and method come first.
+/// Rows for the cells at a budget that `use` accepts; scene and method are the first columns.
 template <typename Fill>
 Json cell_rows(const Results& results, size_t budget, Fill&& fill, bool (*use)(const Cell&) = every_cell) {
   Json rows = Json::array();
@@ -81,7 +81,7 @@ Json plot(const std::string& title, const std::string& x_label, Json series, con
           {"alt", alt}};
 }
 
-/// One line a method over the budgets that it has in `unit`.
+/// One line per method over its budgets in `unit`.
 template <typename X, typename Use>
 Json error_series(const Results& results, size_t scene, X&& x, Use&& use) {
   Json series = Json::array();
@@ -98,7 +98,7 @@ Json error_series(const Results& results, size_t scene, X&& x, Use&& use) {
       const Estimate& error = cell->split.relative.error;
       line["x"].push_back(x(*cell));
       line["y"].push_back(error.value);
-      // A logarithmic axis ends above zero.
+      // A logarithmic axis cannot reach zero.
       line["low"].push_back(number(std::max(error.low, 0.1 * error.value)));
       line["high"].push_back(number(error.high));
     }
@@ -107,7 +107,7 @@ Json error_series(const Results& results, size_t scene, X&& x, Use&& use) {
   return series;
 }
 
-/// "pt 0.013 to 0.0012, iicv 0.0018 to 0.0004": what a plot shows, for those who cannot see it.
+/// "pt 0.013 to 0.0012, iicv 0.0018 to 0.0004": text alternative of a plot.
 std::string alternative(const std::string& start, const Json& series) {
   std::string text = start;
   for (const Json& line : series)
@@ -374,9 +374,9 @@ Json front_plot(const Results& results, size_t budget) {
       gains.push_back(cell.equal_sample);
       share += split.squared_bias.value / split.error.value;
       const double width = (split.squared_bias.high - split.squared_bias.low) / 2 / split.error.value;
-      square += width * width;  // not a number with two seeds, which give no interval
+      square += width * width;  // NaN with two seeds, which give no interval
     }
-    // Means over fewer scenes do not compare.
+    // Means over fewer scenes are not comparable.
     if (gains.empty() || static_cast<ptrdiff_t>(gains.size()) < n_scenes) continue;
     const auto n = static_cast<double>(gains.size());
     const double error = 1 / geometric_mean(gains).value;

@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// JSON has no not-a-number: null.
+/// JSON has no NaN: null.
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json json_of(const Estimate& e) {
@@ -46,7 +46,7 @@ Json json_of(const FrameErrors& frame) {
           {"still_relmse", number(frame.still_relmse)}};
 }
 
-/// What a cell has of its frames.
+/// A cell's results per frame.
 Json frames_of(const Cell& cell, const std::vector<int>& numbers) {
   Json frames = Json::array();
   for (size_t f = 0; f < cell.frames.size(); ++f) {
@@ -152,7 +152,7 @@ Json json_of(const SceneResult& result) {
             {"relmse", number(reference.relmse)}}}};
 }
 
-/// The first value of a key in a file of "key : value" lines, "" where there is none.
+/// The first value of a key in a file of "key : value" lines; "" if there is none.
 std::string fact(const char* path, const std::string& key) {
   std::ifstream file(path);
   for (std::string line; std::getline(file, line);)

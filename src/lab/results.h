@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an experiment found, and its two machine-readable forms. docs/file-formats.md describes both.
+// Results of an experiment, and their two machine-readable forms, described in docs/file-formats.md.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -20,22 +20,22 @@ struct RunResult {
   uint64_t seed = 0;
   RunRecord record;
   double relmse = 0, relmse_trimmed = 0, mse = 0, mae = 0, flip = 0, above5 = 0, mean_ratio = 0;
-  double predicted_relmse = kNone;  ///< from the run's own standard errors, where it has them
-  /// Between which the run itself says that its relMSE is in 80 of 100 renders; none where it does not.
+  double predicted_relmse = kNone;  ///< from the run's own standard errors, if any
+  /// Bounds that the run reports for its relMSE, meant to hold in 80 % of renders; NaN if it reports none.
   double predicted_low = kNone, predicted_high = kNone;
-  /// Part of the values that differ from the reference by 1.96 standard errors at most, the reference's included.
+  /// Fraction of the values within 1.96 standard errors of the reference, the reference's own noise included.
   double coverage = kNone;
-  double temporal = kNone, temporal_flip = kNone;  ///< of frames: metrics/sequence_errors.h
+  double temporal = kNone, temporal_flip = kNone;  ///< of sequences: metrics/sequence_errors.h
   std::vector<FrameErrors> frames;                 ///< empty for a single image
 };
 
-/// Numbers of samples that differ by this part at most count as the same.
+/// Numbers of samples that differ by at most this fraction count as equal.
 inline constexpr double kSameSamples = 0.01;
 
 /// All runs of one scene, method and budget.
 struct Cell {
   size_t scene = 0, method = 0, budget = 0;  ///< indices into the suite
-  std::vector<RunResult> runs;               ///< by seed, as in the suite
+  std::vector<RunResult> runs;               ///< by seed, in the suite's order
   ErrorSplit split;
   Estimate relmse_trimmed, mae, flip, above5;
   double mae_of_mean = kNone, flip_of_mean = kNone;  ///< of the mean image of all runs
@@ -43,21 +43,21 @@ struct Cell {
   Estimate method_seconds;  ///< render + estimate + then
   double samples_per_pixel = 0, peak_memory_bytes = 0;
   Estimate efficiency;  ///< 1 / (relMSE x method seconds)
-  /// Error of the baseline over error of this method: with the same samples; with the same time.
+  /// Error of the baseline over the error of this method, at equal samples and at equal time.
   Estimate equal_sample, equal_time;
-  /// Both took numbers of samples that differ by more than kSameSamples, so that equal_sample compares error x samples.
+  /// Numbers of samples differ by more than kSameSamples, so equal_sample compares error x samples.
   bool equal_sample_normalised = false;
   /// For time budgets: method seconds / budget.
   double time_ratio = kNone;
   Estimate predicted_over_true;  ///< predicted relMSE / relMSE
   Estimate coverage;             ///< of RunResult
-  // Of frames: of their changes, and beside the baseline's frames of the same budget.
+  // For sequences: errors of changes between frames, and comparisons with the baseline at the same budget.
   Estimate temporal, temporal_flip;
   Estimate temporal_gain;           ///< temporal error of the baseline over that of this method
   std::vector<FrameErrors> frames;  ///< means over seeds
   std::optional<WorstRegions> worst;
-  double bounded = kNone;      ///< part of the runs with a prediction that say between which bounds their relMSE is
-  double bounds_hold = kNone;  ///< part of these whose relMSE is there
+  double bounded = kNone;      ///< fraction of runs with a prediction that also report bounds
+  double bounds_hold = kNone;  ///< fraction of these whose relMSE is within the bounds
   double published_relmse = kNone, published_ratio = kNone;
   std::vector<std::string> suspicions;
 };
@@ -65,7 +65,7 @@ struct Cell {
 struct Reference {
   std::vector<std::string> files;
   std::string origin;     ///< command lines or "given"
-  uint32_t spp = 0;       ///< of each half; 0 where given
+  uint32_t spp = 0;       ///< of each half; 0 if given
   double seconds = 0;     ///< both halves
   double relmse = kNone;  ///< of the mean of the halves
 };
@@ -78,10 +78,10 @@ struct SceneResult {
 };
 
 struct Failure {
-  std::string scene, method, budget;  ///< empty where it concerns all
+  std::string scene, method, budget;  ///< empty if it concerns all
   std::string command, message;
   int exit_code = 0;
-  size_t not_tried = 0;  ///< runs that were left out because of it
+  size_t not_tried = 0;  ///< runs that were skipped because of it
 };
 
 struct Slope {
@@ -89,16 +89,16 @@ struct Slope {
   Estimate exponent;
 };
 
-/// Geometric means over the scenes in which every method has usable numbers at the budget, so that rows compare;
-/// methods that have them in no scene do not decide.
+/// Geometric means over the scenes in which every method has usable numbers at the budget, so that rows are comparable;
+/// methods that have none in any scene do not restrict the scenes.
 struct Summary {
   size_t method = 0, budget = 0, n_scenes = 0;
   double samples_per_pixel = kNone;      ///< taken, mean over scenes
   bool equal_sample_normalised = false;  ///< in any scene
   Estimate equal_sample, equal_time;
-  double relmse = kNone, published_ratio = kNone;  ///< the latter where all of these scenes have one
+  double relmse = kNone, published_ratio = kNone;  ///< the latter if all of these scenes have one
   double flip = kNone;                             ///< arithmetic mean
-  std::vector<size_t> unusable;                    ///< scenes in which this method has no error above zero, or no ratio
+  std::vector<size_t> unusable;                    ///< scenes in which this method has no positive error or no ratio
 };
 
 struct Results {
@@ -106,7 +106,7 @@ struct Results {
   bool complete = false;  ///< nothing failed
   std::string version, command, date;
   nlohmann::ordered_json machine;
-  std::vector<SceneResult> scenes;  ///< as in the suite; a scene that could not be read has no frame
+  std::vector<SceneResult> scenes;  ///< in the suite's order; a scene that could not be read has no frame
   std::vector<Cell> cells;
   std::vector<Slope> slopes;
   std::vector<Summary> summaries;
@@ -119,7 +119,7 @@ struct Results {
 /// First word of the value of "format", the first key.
 inline constexpr const char* kResultsFormat = "covary-experiment";
 nlohmann::ordered_json to_json(const Results& results);
-/// Of to_json(), in long format: scene, method, budget, unit, seed, quantity, value, standard_error, low, high.
+/// CSV of to_json() in long format: scene, method, budget, unit, seed, quantity, value, standard_error, low, high.
 std::string to_csv(const nlohmann::ordered_json& results);
 
 /// Processor, cores, memory, operating system.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Results as CSV in long format: one number of their JSON a row.
+// Results as CSV in long format: one row per number in their JSON.
 #include <fmt/format.h>
 
 #include "lab/results.h"
@@ -9,7 +9,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// RFC 4180: quoted where it holds a comma, a quote or a line break.
+/// RFC 4180: quoted if it contains a comma, a quote or a line break.
 std::string field(const std::string& text) {
   if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
   std::string quoted = "\"";
@@ -19,7 +19,7 @@ std::string field(const std::string& text) {
 
 std::string number(const Json& value) { return value.is_number() ? fmt::format("{}", value.get<double>()) : ""; }
 
-/// Rows of all numbers below `json`, by the path to them: "seconds_load". Those that do not exist have none.
+/// One row for each number below `json`, named by its path, "seconds_load", and 1 for each true boolean. Others have none.
 void add_rows(const std::string& prefix, const std::string& quantity, const Json& json, std::string& text) {
   if (json.is_number()) text += fmt::format("{}{},{},,,\n", prefix, quantity, number(json));
   if (json.is_boolean() && json.get<bool>()) text += fmt::format("{}{},1,,,\n", prefix, quantity);

@@ -31,13 +31,13 @@ std::optional<nlohmann::json> read_json_file(const std::string& path) {
   return json;
 }
 
-/// The command as a user types it: `covary` for the program's path.
+/// The command as a user would type it: `covary` instead of the program's path.
 std::string typed(Words command) {
   command[0] = "covary";
   return shell_text(command);
 }
 
-/// Adds the statistics of an image, of which there are `n`.
+/// Adds the statistics of one of `n` images.
 void add_statistics(const nlohmann::json& stats, size_t n, RunRecord& record) {
   const nlohmann::json seconds = stats.value("seconds", nlohmann::json::object());
   record.load_seconds += seconds.value("load", 0.0) + seconds.value("build", 0.0);
@@ -48,7 +48,7 @@ void add_statistics(const nlohmann::json& stats, size_t n, RunRecord& record) {
   record.peak_memory_bytes = std::max(record.peak_memory_bytes, stats.value("peak_memory_bytes", 0.0));
 }
 
-/// Part of the names of a run's files: the number of the frame.
+/// The frame number in the names of a run's files.
 std::string number_of(const Run& run) { return run.frames.empty() ? "" : "_####"; }
 
 nlohmann::json json_of(const RunRecord& r) {
@@ -129,7 +129,7 @@ Runner::Result Runner::execute(const Run& run, const SceneInstance& scene) const
   if (threads_ > 0) render.insert(render.end(), {"--threads", fmt::format("{}", threads_)});
   std::string output = run.then.empty() ? image : folder + "/step0" + number + ".exr";
   render.insert(render.end(), {"--quiet", "--no-preview", "--json", stats, "-o", output});
-  // Frames that are done are their own memory of an interruption.
+  // Of an interrupted sequence, complete frames are kept instead of films.
   if (run.frames.empty()) render.insert(render.end(), {"--passes", cache_.path("passes", run.passes_key)});
   render.emplace_back(run.timed ? "--overwrite" : "--resume");
   const auto failed = [&](const std::string& command, const ProcessResult& process) -> Result {
@@ -138,7 +138,7 @@ Runner::Result Runner::execute(const Run& run, const SceneInstance& scene) const
     return {std::nullopt, RunFailure{command, process.exit_code, signal + process.errors}};
   };
   const ProcessResult process = run_process(render, stop_);
-  // An image that is not as good as wanted is an image.
+  // An image that missed its target error is still an image.
   constexpr int kTargetMissed = 3;
   if (!process.ok() && process.exit_code != kTargetMissed) return failed(typed_command, process);
   RunRecord record;

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs of the program, kept on disk: what already exists is not run again, and what is there is always whole.
+// Runs of the program, cached on disk: existing results are not computed again, and files in the cache are always
+// complete.
 //
 // The cache is a folder:
 //     runs/KEY/image.exr, stats.json    output of the render (or of the last command after it)
-//     runs/KEY/run.json                 what is known of the run; written last, so that its presence means "done"
-//     passes/KEY/                       films of runs that are not done, or kept on request
+//     runs/KEY/run.json                 record of the run; written last, so its presence means "done"
+//     passes/KEY/                       films of unfinished runs, or kept on request
 //     measures/KEY.json                 errors of images
 #pragma once
 
@@ -24,16 +25,16 @@ namespace covary::lab {
 struct RunRecord {
   std::string image;    ///< path of the EXR
   std::string command;  ///< as typed in a shell
-  /// load: reading the scene and building the hierarchy; render: with the trials of a time budget; then: commands after
-  /// the render, wall clock.
+  /// load: reading the scene and building the BVH; render: including training and trials; then: commands after the
+  /// render. Wall clock.
   double load_seconds = 0, render_seconds = 0, estimate_seconds = 0, then_seconds = 0;
   double samples_per_pixel = 0, peak_memory_bytes = 0;
-  std::string messages;  ///< what the run wrote to standard error
-  /// What the method takes beyond loading the scene.
+  std::string messages;  ///< standard error of the run
+  /// Time of the method without loading the scene.
   double method_seconds() const { return render_seconds + estimate_seconds + then_seconds; }
 };
 
-/// The object `seconds` of a run, in the cache and in results.
+/// The object `seconds` of a run, as used in the cache and in results.
 nlohmann::ordered_json seconds_of(const RunRecord& record);
 
 /// A run that ended in an error.
@@ -45,16 +46,16 @@ struct RunFailure {
 
 class Cache {
  public:
-  /// Makes the folder where needed and locks it against other experiments until this object ends; with `part`, the
-  /// name of a part of an experiment, not against other parts. Throws Error(kIo).
+  /// Creates the folder if needed and locks it against other experiments while this object lives; with `part`, the name
+  /// of a part of an experiment, not against other parts. Throws Error(kIo).
   explicit Cache(std::string folder, const std::string& part = "");
   ~Cache();
   Cache(const Cache&) = delete;
   Cache& operator=(const Cache&) = delete;
 
-  /// A path in the cache; the folder it lies in exists then.
+  /// A path in the cache; creates its folder.
   std::string path(const std::string& kind, const std::string& key) const;
-  /// A JSON file of the cache; nothing where it is missing or damaged.
+  /// A JSON file in the cache; nullopt if missing or damaged.
   std::optional<nlohmann::json> read_json(const std::string& kind, const std::string& key) const;
   void write_json(const std::string& kind, const std::string& key, const nlohmann::json& json) const;
   const std::string& folder() const { return folder_; }
@@ -70,15 +71,15 @@ class Runner {
   Runner(const Cache& cache, std::string program, int threads, const std::atomic<bool>* stop)
       : cache_(cache), program_(std::move(program)), threads_(threads), stop_(stop) {}
 
-  /// The kept record of a run.
+  /// The cached record of a run.
   std::optional<RunRecord> find(const Run& run) const;
-  /// Runs it. Exactly one of the two is set, or none when it was stopped.
+  /// Executes the run. Exactly one of the two is set, or neither if it was stopped.
   struct Result {
     std::optional<RunRecord> record;
     std::optional<RunFailure> failure;
   };
   Result execute(const Run& run, const SceneInstance& scene) const;
-  /// Removes the films of passes that no run needs any more.
+  /// Removes films of passes that no other run needs.
   void remove_passes(const std::string& passes_key) const;
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pixels of a scene: an image, or the frames of a sequence, one below the other, so that errors of all pixels are
+// The pixels of a scene: an image, or the frames of a sequence stacked vertically, so that errors over all pixels are
 // those of the sequence.
 #pragma once
 
@@ -12,11 +12,11 @@
 
 namespace covary::lab {
 
-/// Pixels of a scene's window from an image of any size that covers it, or from all frames; of `layer`, or the scene's
-/// where that is empty. Throws Error(kInput) where an image does not cover the window.
+/// The pixels in a scene's window, from an image of any size that covers it or from all frames; of `layer`, or the
+/// scene's layer if that is empty. Throws Error(kInput) if an image does not cover the window.
 Image read_window(const std::string& path, const SceneInstance& scene, const std::string& layer = "");
 
-/// The images that such pixels are made of.
+/// Splits such pixels into the images they consist of.
 std::vector<Image> images_of(const Image& pixels, const SceneInstance& scene);
 
 /// The mean of a metric over the scene's images.

@@ -108,7 +108,7 @@ Estimate convergence_slope(std::span<const double> samples, const std::vector<st
     if (!(error.value > 0)) return {};
     x.push_back(std::log(samples[b]));
     y.push_back(std::log(error.value));
-    // Equal errors of all seeds must not divide by zero.
+    // Avoids division by zero if the errors of all seeds are equal.
     sigma.push_back(std::max(error.standard_error / error.value, 1e-6));
   }
   const double value = weighted_slope(x, y, sigma);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Quantiles against tables, intervals and slopes against numbers of known distribution.
+// Quantiles against tables; intervals and slopes of numbers with known distribution.
 #include "lab/statistics.h"
 
 #include <gtest/gtest.h>
@@ -47,9 +47,9 @@ TEST(Statistics, JackknifeOfAMeanIsItsStandardError) {
   EXPECT_NEAR(e.standard_error, mean_estimate(values).standard_error, 1e-12);
 }
 
-// N = 2000 experiments of K = 6 pairs a, b with means 6 and 2 that share a part of their noise. The interval of the
-// ratio must hold 3 in 95 % of them; binomial standard deviation 0.49 %, alpha = 1e-5: within 2.2 %, plus 1 % for the
-// logarithm being not quite normal. An interval that ignored the pairs would hold 99.9 %.
+// N = 2000 experiments of K = 6 pairs a, b with means 6 and 2 that share some of their noise. The interval of the ratio
+// must contain 3 in 95 % of them; binomial standard deviation 0.49 %, alpha = 1e-5: within 2.2 %, plus 1 % because the
+// logarithm is not exactly normal. An interval that ignored the pairing would cover 99.9 %.
 TEST(Statistics, RatioOfPairs) {
   int held = 0;
   for (uint64_t i = 0; i < 2000; ++i) {
@@ -76,15 +76,15 @@ TEST(Statistics, GeometricMean) {
 }
 
 TEST(Statistics, WeightedSlope) {
-  // The third point is off the line of slope -1 and has next to no weight.
+  // The third point is off the line of slope -1 but has almost no weight.
   EXPECT_NEAR(weighted_slope(std::array{0.0, 1.0, 2.0}, std::array{5.0, 4.0, 0.0}, std::array{0.1, 0.1, 1e6}), -1,
               1e-9);
   EXPECT_NEAR(weighted_slope(std::array{0.0, 1.0, 2.0}, std::array{5.0, 4.0, 0.0}, std::array{1.0, 1.0, 1.0}), -2.5,
               1e-12);
 }
 
-// N = 500 experiments: errors n^-0.8 with 10 % noise, half of which is the same for all budgets of a seed; K = 6 seeds.
-// The interval must hold -0.8 in 95 % of them; binomial standard deviation 0.97 %, alpha = 1e-5: within 4.4 %.
+// N = 500 experiments: errors n^-0.8 with 10 % noise, half of which is common to all budgets of a seed; K = 6 seeds.
+// The interval must contain -0.8 in 95 % of them; binomial standard deviation 0.97 %, alpha = 1e-5: within 4.4 %.
 TEST(Statistics, SlopeOfConvergence) {
   const std::array samples{48.0, 96.0, 192.0, 384.0};
   int held = 0;

@@ -16,7 +16,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
-/// Options of `covary render` that the laboratory itself gives.
+/// Options of `covary render` that the laboratory sets itself.
 const std::vector<std::string> kReserved = {"--spp",  "--time",       "--seed",   "-o",       "--output",
                                             "--json", "--passes",     "--resume", "--quiet",  "--no-preview",
                                             "--crop", "--resolution", "--replay", "--frames", "--camera-path"};

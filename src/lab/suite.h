@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An experiment as data: scenes x methods x budgets x seeds. docs/experiments.md describes the file.
+// An experiment as data: scenes x methods x budgets x seeds. File format: docs/experiments.md.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ struct Budget {
   std::string key() const;    ///< as in `published`: "192", "10s"
 };
 
-/// References made with `spp` samples per pixel in each half, or taken from one or two files.
+/// References rendered with `spp` samples per pixel in each half, or read from one or two files.
 struct ReferencePlan {
   uint32_t spp = 0;
   std::vector<std::string> files;
@@ -34,13 +34,13 @@ struct SceneEntry {
   std::string name;
   std::string file;        ///< as written; relative to the suite's scene folder
   std::string resolution;  ///< WIDTHxHEIGHT, or empty: the scene's own
-  std::string crop;        ///< X,Y,WIDTH,HEIGHT, or WIDTHxHEIGHT in the middle of the frame, or empty
+  std::string crop;        ///< X,Y,WIDTH,HEIGHT; WIDTHxHEIGHT for the centre of the frame; or empty
   std::optional<int64_t> max_depth;
   std::vector<std::string> defines;  ///< name=value
   std::string credit;                ///< author, title, licence
   std::string frames;                ///< "1-16": frames of a sequence; empty: one image
-  std::string camera_path;           ///< of them: file beside the scene's; empty: the camera is the scene's
-  std::string layer;                 ///< of images and references that is looked at; empty: R G B
+  std::string camera_path;           ///< for the frames: file next to the scene's; empty: the scene's own camera
+  std::string layer;                 ///< layer of images and references to measure; empty: R G B
   std::vector<CropWindow> insets;    ///< in the frame
   std::optional<ReferencePlan> reference;
 };
@@ -49,8 +49,8 @@ struct MethodEntry {
   std::string name;
   std::vector<std::string> options;            ///< of `covary render`
   std::vector<std::vector<std::string>> then;  ///< further commands "covary WORD… IN -o OUT"
-  bool unbiased = false;                       ///< a squared bias then points to a wrong reference
-  bool optional = false;                       ///< left out, with a warning, on scenes and machines that lack its means
+  bool unbiased = false;                       ///< a squared bias then suggests a wrong reference
+  bool optional = false;                       ///< skipped, with a warning, on scenes and machines that lack support
 };
 
 struct Suite {
@@ -60,7 +60,7 @@ struct Suite {
   std::vector<MethodEntry> methods;
   std::vector<Budget> budgets;
   std::vector<uint64_t> seeds;
-  std::vector<std::string> common_options;  ///< of every render, references included
+  std::vector<std::string> common_options;  ///< for every render, references included
   std::string baseline;                     ///< name of a method
   std::optional<Budget> show;               ///< budget of the pictures; default: the last
   ReferencePlan reference;
@@ -77,31 +77,31 @@ struct Suite {
 /// Seeds of the two halves of a reference; no run may use them.
 inline constexpr uint64_t kReferenceSeeds[2] = {900000001, 900000002};
 
-/// What is wrong with a word of a command.
+/// A problem with a word of a command.
 struct WordProblem {
   size_t word;
   std::string text;
 };
-/// Says what a suite may not give: of "render" with the options of a method, and of each command that follows.
+/// Finds forbidden words in a command: "render" with the options of a method, or one of the commands that follow.
 using CommandCheck = std::function<std::vector<WordProblem>(const std::vector<std::string>& command)>;
 
-/// Reads a suite. `name` stands for the file in messages. Throws Error(kInput) that lists all problems with their
-/// lines, those of its commands as well where a `check` is given.
+/// Reads a suite. `name` is used as the file name in messages. Throws Error(kInput) listing all problems with their
+/// lines, including those that `check`, if given, finds in its commands.
 Suite parse_suite(const std::string& text, const std::string& name, const CommandCheck& check = {});
 
-/// Every problem of the suite as a whole, after all settings were overridden; empty when it can be run.
+/// All problems of the suite as a whole, after overrides; empty if it can be run.
 std::vector<std::string> validate(const Suite& suite);
 
 nlohmann::ordered_json to_json(const Suite& suite);
 
-/// The folder that the suite's scene files are relative to: that of a file of a suite, the current one for a scene. For
-/// the name of a built-in suite it is searched here, in the source tree and the installation that `program`, the path
-/// of `covary`, lies in. `word` names the suite on the command line. Throws Error(kUsage) where there is none.
+/// The folder that the suite's scene files are relative to: that of the suite's file, or the current folder for a
+/// scene. For a built-in suite, it is searched here, and in the source tree and installation that contain `program`,
+/// the path of `covary`. `word` names the suite on the command line. Throws Error(kUsage) if there is none.
 std::string scenes_folder(const Suite& suite, const std::string& word, const std::string& program);
 
-// The suites that come with the program: suites/*.json of the source tree.
+// Suites built into the program: suites/*.json of the source tree.
 
-/// Text of each suite by name, "iicv-table1".
+/// Text of each suite by name: "iicv-table1".
 const std::map<std::string, std::string_view>& builtin_suites();
 
 }  // namespace covary::lab

@@ -16,8 +16,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr int64_t kLargestInt = std::numeric_limits<int>::max();
-constexpr int64_t kLargestSpp = 1 << 30;  // as of `covary render --spp`
-constexpr size_t kMostSeeds = 100000;     // as of `covary experiment --seeds`
+constexpr int64_t kLargestSpp = 1 << 30;  // as for `covary render --spp`
+constexpr size_t kMostSeeds = 100000;     // as for `covary experiment --seeds`
 
 class SuiteReader {
  public:
@@ -196,7 +196,7 @@ class SuiteReader {
     return fmt::format("method '{}': {}", method.name, text);
   }
 
-  /// What is wrong with the common options is found with each method.
+  /// Problems of the common options would otherwise be reported with each method.
   void add_once(const std::string& place, const std::string& text) {
     at("").problem(place, text);
     if (std::find(problems_.begin(), problems_.end() - 1, problems_.back()) != problems_.end() - 1)

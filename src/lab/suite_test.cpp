@@ -171,7 +171,7 @@ TEST(Suite, ValidatesAsAWhole) {
     EXPECT_TRUE(contains(all, part));
 }
 
-/// Built-in suites find their scenes in the source tree, and beside the program where it is installed.
+/// Built-in suites find their scenes in the source tree, and next to the program if it is installed.
 TEST(Suite, KnowsWhereItsScenesLie) {
   namespace fs = std::filesystem;
   const fs::path tree = test_support::test_folder();
