@@ -19,7 +19,7 @@ std::string field(const std::string& text) {
 
 std::string number(const Json& value) { return value.is_number() ? fmt::format("{}", value.get<double>()) : ""; }
 
-/// One row for each number below `json`, named by its path, "seconds_load", and 1 for each true boolean. Others have none.
+/// One row for each number below `json`, named by its path, "seconds_load", and 1 for each true boolean.
 void add_rows(const std::string& prefix, const std::string& quantity, const Json& json, std::string& text) {
   if (json.is_number()) text += fmt::format("{}{},{},,,\n", prefix, quantity, number(json));
   if (json.is_boolean() && json.get<bool>()) text += fmt::format("{}{},1,,,\n", prefix, quantity);
