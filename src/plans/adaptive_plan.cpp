@@ -23,7 +23,7 @@ namespace {
 
 constexpr double kFirstShare = 0.5;        // maximum fraction of the budget or the time
 constexpr double kShareOfFirst = 1.0 / 3;  // fraction of the budget if it is part of the image
-constexpr double kOverestimate = 1.1;      // fraction of the samples that the time limit allows
+constexpr double kOverestimate = 1.1;      // factor on the samples that the time limit allows
 
 constexpr uint32_t kFirstOfError = 50;  // samples of the first pass if a relative error determines the rest
 
@@ -34,7 +34,7 @@ struct Method {
   int fewest_groups = 1;
   DenoisedMean denoise;  ///< of a denoised mean, which includes the first pass
 
-  /// Of both films.
+  /// Groups of both films.
   uint32_t groups_of(const PlanState& state) const {
     if (groups) return static_cast<uint32_t>(*groups);
     if (denoise) return static_cast<uint32_t>(number_of_groups({{1.0}, 1}, state));
@@ -100,7 +100,7 @@ double samples_in_time(const PlanState& state) {
   return std::floor(std::max(1.0, kOverestimate * std::max(0.0, *state.seconds_left) * speed / pixels));
 }
 
-/// Whether an error map of these samples would tell where errors are, rather than where single bright paths went.
+/// Whether an error map of these samples shows where errors are, rather than where single bright paths landed.
 bool tells_where_errors_are(const GroupedImage& image) {
   EstimatorResult mean = mean_of_groups(image);
   add_risk_of_mean(image, mean);
@@ -168,7 +168,7 @@ void set_estimate(const Estimator& estimator, Plan& plan) {
     };
     return;
   }
-  plan.estimate_memory.of_halves_per_group = 3 * sizeof(float);  // the film of both
+  plan.estimate_memory.of_halves_per_group = 3 * sizeof(float);  // the joined film
   plan.estimate = [apply](std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside) {
     const Film film = joined(passes[0].film, passes[1].film);
     PairSettings settings;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plans whose first pass says how many samples the last one takes: budgets, interruptions, limits, bias.
+// Plans whose first pass determines the sample counts of the last: budgets, interruptions, limits, bias.
 #include "plans/adaptive_plan.h"
 
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ Plan plain_adaptive(OptionValues options = {}) {
   return plan_of("none", options);
 }
 
-/// A denoised mean, by filters alone.
+/// A denoised mean that uses only filters.
 Estimator denoised(OptionValues options = {}) {
   options["adaptive"] = "";
   return with_denoising(make_estimator("none", options), {.mode = DenoiseMode::kAuto, .use_oidn = false, .oidn = {}});
@@ -71,7 +71,7 @@ TEST(AdaptivePlan, OptionsOfTheEstimatorReachIt) {
   for (const uint32_t n : independent.counts()) EXPECT_EQ(n, class_of(n)) << "classes";
 }
 
-/// Half of the samples are the CRN pass's, and groups are there for the estimator to read.
+/// Half of the samples belong to the CRN pass, and the estimator gets the groups that it reads.
 TEST(AdaptivePlan, ControlVariatesOfUnequalNumbers) {
   const LoadedScene scene = load_sized(kRoom);
   const RenderResult result = render(scene, plan_of("iicv", {{"adaptive", ""}}), request_of(192));
@@ -131,7 +131,7 @@ TEST(AdaptivePlan, TooSmallABudgetIsAnError) {
   EXPECT_EQ(message(2, {}), "no error");
 }
 
-/// One sample in the first pass tells of no noise: all pixels get the same.
+/// One sample in the first pass gives no estimate of noise: all pixels get the same number.
 TEST(AdaptivePlan, OneSampleOfTheFirstPass) {
   const LoadedScene scene = load_sized(kRoom, 16, 12);
   const RenderResult result = render(scene, plan_of("dependent-tests", {{"dependent-spp", "1"}}), request_of(9));
@@ -219,7 +219,7 @@ TEST(AdaptivePlan, FilmsOfTwoSeedsMerge) {
   for (const float value : result.estimate.data) EXPECT_TRUE(std::isfinite(value));
 }
 
-/// The passes of a crop are those pixels of the frame's where numbers do not depend on others.
+/// Passes of a crop equal the same pixels of the whole frame, except where counts depend on other pixels.
 TEST(AdaptivePlan, CropsHaveTheFramesFirstPass) {
   const LoadedScene scene = load_sized(kRoom);
   RenderRequest request = request_of(24);
@@ -256,7 +256,7 @@ TEST(AdaptivePlan, PlansMemoryForBothPasses) {
   EXPECT_EQ(memory.films, 40 * 30 * 2 * (2 * 12 + 4));
 }
 
-/// A third of the samples say where the others go, and the image is made of all.
+/// A third of the samples decide where the others go; the image is made of all.
 TEST(DenoisedPlan, TopsUpWhereTheFilteredImageIsWrong) {
   const LoadedScene scene = load_sized(kRoom);
   const RenderResult result = render(scene, adaptive_plan(denoised()), request_of(72));
@@ -281,7 +281,7 @@ TEST(DenoisedPlan, TopsUpWhereTheFilteredImageIsWrong) {
   EXPECT_EQ(uniform.passes[0].film.data(), first.data());
 }
 
-/// Radiance 100 of one sample in a hundred.
+/// Radiance 100 in one sample out of a hundred.
 class FoundByChance : public Integrator {
  public:
   std::shared_ptr<Integrator> clone() const override { return std::make_shared<FoundByChance>(); }
@@ -343,8 +343,8 @@ TEST(UnbiasedPlan, AddsSamplesUntilAnErrorIsReached) {
   EXPECT_GT(result.samples_per_pixel(), 110);
 }
 
-/// Pixels whose samples are 0, or rarely large: the expected value is 1 everywhere. Mean over the pixels of the
-/// combination that the paper publishes, and of the unbiased plan, less that, for one seed.
+/// Pixels whose samples are 0 or, rarely, large; the expected value is 1 everywhere. For one seed, the mean over the
+/// pixels of the published combination and of the unbiased plan, minus that value.
 struct RareLight {
   double published, unbiased;
 };
@@ -387,7 +387,7 @@ TEST(UnbiasedPlan, PassesTheTestThatThePublishedCombinationFails) {
   const statistics::TestResult fair = statistics::t_test(unbiased, 0), biased = statistics::t_test(published, 0);
   EXPECT_TRUE(fair.accepted) << fair.message;
   EXPECT_LT(biased.p_value, 1e-12) << biased.message;
-  // A bias of this size would be seen in the unbiased plan with probability 0.99; that of the other is larger.
+  // A bias of this size would be detected in the unbiased plan with probability 0.99; the other's is larger.
   statistics::Moments of_unbiased, of_published;
   for (const double e : unbiased) of_unbiased.add(e);
   for (const double e : published) of_published.add(e);

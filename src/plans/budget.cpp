@@ -21,7 +21,7 @@ namespace covary {
 namespace {
 
 constexpr uint32_t kFirstBudget = 96;
-/// Of the next budget towards a target error: a larger one overshoots, a smaller one checks more often.
+/// For the next budget towards a target error: a larger one overshoots, a smaller one checks more often.
 constexpr double kMargin = 1.02, kLeastGrowth = 1.06;
 
 }  // namespace
@@ -68,7 +68,7 @@ void set_budget(const Shares& shares, const PlanState& state, std::span<Pass> pa
 
 double samples_per_second(const LoadedScene& scene, const Integrator& integrator, const FilterSettings& filter,
                           const CropWindow& window, const std::atomic<bool>* stop) {
-  constexpr int kCells = 8, kSide = 16;  // a square of pixels in each cell of a grid
+  constexpr int kCells = 8, kSide = 16;  // one square of pixels in each cell of a grid
   PassSettings settings;
   settings.spp = 1;
   settings.filter = filter;
@@ -86,7 +86,7 @@ double samples_per_second(const LoadedScene& scene, const Integrator& integrator
     });
     return static_cast<double>(n_samples) / watch.seconds();
   };
-  trial(1);  // fills the caches
+  trial(1);  // warms the caches
   return trial(2);
 }
 

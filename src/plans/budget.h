@@ -34,7 +34,8 @@ uint32_t largest_budget(const LoadedScene& scene, const RenderRequest& request);
 uint32_t first_budget(const LoadedScene& scene, const RenderRequest& request);
 
 /// Default number of groups of each pass that the estimator reads: choose_groups() of film/groups.h for the state's
-/// group_budget. With a time limit, where the number of samples is only roughly known, divisors gain nothing: 12, or
+/// group_budget. With a time limit, when the number of samples is only roughly known, divisors do not help: 12, or
+/// fewer if there are fewer samples.
 /// fewer if there are fewer samples.
 int number_of_groups(const Shares& shares, const PlanState& state);
 
@@ -42,7 +43,7 @@ int number_of_groups(const Shares& shares, const PlanState& state);
 /// up to whole groups unless the request does not allow that.
 void set_budget(const Shares& shares, const PlanState& state, std::span<Pass> passes);
 
-/// Samples per second, from trials all over the window that take some ten milliseconds. `stop` (may be null) ends them.
+/// Samples per second, from trials of some ten milliseconds spread over the window. `stop` (may be null) ends them.
 double samples_per_second(const LoadedScene& scene, const Integrator& integrator, const FilterSettings& filter,
                           const CropWindow& window, const std::atomic<bool>* stop);
 
@@ -57,8 +58,8 @@ class ErrorRounds {
  public:
   explicit ErrorRounds(uint32_t first) : budgets_{first} {}
   uint32_t budget() const { return budgets_[now_]; }
-  /// Takes over the budgets of a film that another call began, unless more are known, and `limit` for those above it.
-  /// Throws Error(kInput), naming `path`, if they are invalid.
+  /// Adopts the budgets recorded in a film of an earlier call, unless more are known already, with `limit` for those
+  /// above it. Throws Error(kInput), naming `path`, if they are invalid.
   void take(const std::string& text, uint32_t limit, const std::string& path);
   /// Moves on to the next budget if an earlier call decided on one.
   bool repeat();

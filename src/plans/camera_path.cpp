@@ -21,7 +21,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Throws for members that are not among `names`.
+/// Throws for members not in `names`.
 void check_members(const Json& object, std::initializer_list<std::string_view> names) {
   for (const auto& [name, value] : object.items())
     if (std::find(names.begin(), names.end(), name) == names.end())

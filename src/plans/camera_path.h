@@ -28,15 +28,15 @@ class CameraPath {
   double frames_per_second_;
 };
 
-/// Throws Error(kInput), naming the file and the problem: not JSON, unknown or missing members, matrices of other
-/// sizes, and whatever KeyedTransform refuses.
+/// Throws Error(kInput), naming the file and the problem: not JSON, unknown or missing members, matrices of the wrong
+/// size, or anything that KeyedTransform rejects.
 CameraPath parse_camera_path(const std::string& text, const std::string& name);
-/// The same of a file; also throws Error(kIo).
+/// The same for a file; also throws Error(kIo).
 CameraPath read_camera_path(const std::string& path);
 
 /// Moves the scene's camera between renders; everything else stays built. The content_hash distinguishes films and
-/// images by camera position and, where shapes move, by time. Throws Error(kInput) for a transformation that the camera
-/// cannot have.
+/// images by camera transformation and, if shapes move, by time. Throws Error(kInput) for a transformation that the
+/// camera does not support.
 void place_camera(LoadedScene& scene, const Transform& to_world);
 
 }  // namespace covary

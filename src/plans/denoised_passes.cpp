@@ -13,7 +13,7 @@
 namespace covary {
 namespace {
 
-constexpr uint32_t kTrialPass = 2;  // pass number in its random numbers, which no pass of the plan has
+constexpr uint32_t kTrialPass = 2;  // pass number in its random numbers, which no pass of the plan uses
 
 }  // namespace
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two independent passes of one denoised mean: where the second one samples, and the film of both.
+// Two independent passes of one denoised mean: sampling of the second one, and the film of both.
 #pragma once
 
 #include <functional>
@@ -15,11 +15,11 @@ using DenoisedMean =
     std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent, const PairSettings&)>;
 
 /// For sample_counts(): squared relative error of the denoised image of `first` at each pixel, over the cost of a
-/// sample there. All 0 if the image does not know its error.
+/// sample there. All 0 if the image has no error estimate.
 std::vector<double> filtered_errors(const DenoisedMean& denoise, const Film& first, const PlanState& state);
 
-/// The film of both passes' samples, with the same groups, of equal sizes in each pixel of `first`. The second's
-/// numbers of samples depend on the first's values over many pixels, so the sum is only nearly unbiased
+/// The sum of both passes' films, with the same groups; in each pixel of `first` they are of equal size. The second's
+/// sample counts depend on the first's values over many pixels, so the sum is only nearly unbiased
 /// (docs/notes/adaptive-counts.md).
 Film joined(const Film& first, const Film& last);
 

@@ -29,13 +29,13 @@ PixelEstimate pixel_estimate(const PixelFunction& estimate, int dimensions) {
   };
 }
 
-/// Memory beside a film of groups: moments and a mask.
+/// Memory in addition to a film of groups: moments and a mask.
 constexpr double kBytesOfMean = 7 * sizeof(float);
 
 EstimatorResult mean_of_first(std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside) {
   const GroupedImage groups = rows_of(passes[0].film, first_row, n_rows);
   EstimatorResult mean = mean_of_groups(groups);
-  // Pixels with common random numbers err together, which their variances do not show.
+  // With common random numbers, errors are correlated between pixels, which variances do not show.
   if (passes[0].plan.sampling == Sampling::kIndependent) add_risk_of_mean(groups, mean);
   for (const Layer& layer : beside.layers) mean.layers.push_back(mean_of_groups(layer.image).estimate);
   return mean;
@@ -85,7 +85,7 @@ Plan plain_plan(Sampling sampling, std::optional<int> groups) {
     pass.name = sampling == Sampling::kCrn ? "crn" : "independent";
     pass.sampling = sampling;
     const bool reads_groups = sampling == Sampling::kCrn || state.request.until > 0;
-    const int fewest = state.request.until > 0 ? 2 : 1;  // for its error
+    const int fewest = state.request.until > 0 ? 2 : 1;  // two for the error
     pass.groups = groups.value_or(reads_groups ? number_of_groups(whole_budget(fewest), state) : 1);
     pass.fewest_groups = groups ? 0 : fewest;
     return std::vector{pass};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What renders find, keep and leave on disk, and what memory they may take.
+// What renders find, keep and leave on disk, and how much memory they may use.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -204,7 +204,7 @@ Plan failing_plan() {
   return plan;
 }
 
-/// `path`, which fails where radiance is told apart by the number of edges.
+/// `path`, but it fails if radiance is separated by number of edges.
 class FailingLengths : public Integrator {
  public:
   explicit FailingLengths(const Integrator& path) : path_(path.clone()) {}
@@ -336,7 +336,7 @@ TEST(FolderLock, NamesTheProcessThatHoldsTheFolder) {
     const FolderLock lock(folder.file("films"));
     char byte = 'x';
     if (write(ready[1], &byte, 1) != 1 || read(done[0], &byte, 1) != 1) _exit(1);
-    _exit(0);  // as if killed: the file stays behind
+    _exit(0);  // as if killed: the file remains
   }
   char byte = 'x';
   ASSERT_EQ(read(ready[0], &byte, 1), 1);

@@ -5,12 +5,12 @@
 
 namespace covary {
 
-/// Reserves a folder for this process as long as the object lives: its file `.lock` is locked (flock) and holds the
-/// process's id. The lock of a dead process does not count; the file is removed at the end.
+/// Reserves a folder for this process for the object's lifetime: its file `.lock` is locked (flock) and contains the
+/// process id. The lock of a dead process has no effect; the file is removed at the end.
 class FolderLock {
  public:
-  /// Creates the folder if missing. Throws Error(kIo) if `folder` is not a folder, cannot be written to, or another
-  /// process holds it, naming that process's id. File systems without locks are used without one.
+  /// Creates the folder if missing. Throws Error(kIo) if `folder` is not a folder, cannot be written to, or is held by
+  /// another process, whose id the message gives. On file systems without locks, does nothing.
   explicit FolderLock(const std::string& folder);
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;

@@ -13,7 +13,7 @@
 namespace covary {
 namespace {
 
-/// By the options' own names instead of aliases. Throws Error(kUsage) for one that the integrator does not have.
+/// The options by their own names instead of aliases. Throws Error(kUsage) for one that the integrator does not have.
 OptionValues own_options(const std::string& integrator, const OptionValues& options) {
   const std::vector<Option> own = options_of_integrator(integrator);
   OptionValues values;
@@ -25,7 +25,7 @@ OptionValues own_options(const std::string& integrator, const OptionValues& opti
   return values;
 }
 
-/// Mitsuba also accepts depths without any paths. Such images are black, which is seldom intended.
+/// Mitsuba also accepts depths without any paths. Such images are black, which is rarely intended.
 void warn_of_black(Parameters& parameters, const Settings& settings) {
   const auto depth = [&](const char* name) { return std::stoi(find_option(settings.options(), name)->default_value); };
   const int most = depth("max-depth"), least = depth("min-depth");

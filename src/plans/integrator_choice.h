@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which integrator a scene is loaded with: the scene's own, with the changes that a caller asks for.
+// The integrator that a scene is loaded with: the scene's own, with the changes that a caller requests.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,7 @@ namespace covary {
 
 struct IntegratorChoice {
   std::string name;      ///< registered name; empty: the scene's
-  OptionValues options;  ///< in place of the scene's; by names without dashes: "max-depth", "cv-grid"
+  OptionValues options;  ///< override the scene's; by names without dashes: "max-depth", "cv-grid"
 };
 
 /// For LoadOptions::make_integrator. Throws Error(kUsage) for invalid options or options that the integrator does not
@@ -22,7 +22,7 @@ std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const 
 
 /// The integrator that a scene was loaded with: its settings, not yet prepared.
 const Integrator& integrator_of(const LoadedScene& scene);
-/// The one that the request names instead, or that.
+/// The integrator named by the request or, by default, the scene's.
 struct RenderRequest;
 const Integrator& integrator_of(const LoadedScene& scene, const RenderRequest& request);
 

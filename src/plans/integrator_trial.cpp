@@ -24,16 +24,16 @@ namespace {
 constexpr double kShare = 0.06;        // fraction of the render's samples for trials, approximately
 constexpr uint32_t kSamples = 8;       // of each integrator at a pixel
 constexpr uint32_t kUsualBudget = 64;  // if the number of samples is unknown
-constexpr int kFewestPixels = 1000;    // tried pixels, if the window has as many
+constexpr int kFewestPixels = 1000;    // pixels sampled, if the window has as many
 constexpr double kClearlyBetter = 0.9;
-constexpr double kCutOff = 0.995;  // fraction of the values that is clamped
+constexpr double kCutOff = 0.995;  // quantile that larger values are clamped to
 /// Changes the render's seed, so that trials share no numbers with its passes.
 constexpr uint64_t kOtherSeed = 0x9e3779b97f4a7c15;
 
-/// Results of one integrator's samples at the tried pixels.
+/// Results of one integrator's samples at the sampled pixels.
 struct Sampled {
   std::vector<Spectrum> means, variances;
-  double rays = 0;  ///< of a sample
+  double rays = 0;  ///< per sample
 };
 
 uint32_t training_of(const Integrator& integrator) {
@@ -46,7 +46,8 @@ uint32_t budget_of(const LoadedScene& scene, const RenderRequest& request) {
   return is_open ? kUsualBudget : request.spp.value_or(static_cast<uint32_t>(scene.spp));
 }
 
-/// Why an integrator is not tried; empty if it is. One that learns needs samples left that profit from the training.
+/// Why an integrator is not tried; empty if it is. One that learns needs enough remaining samples to benefit from
+/// training.
 std::string left_out(const Integrator& integrator, const Scene& scene, uint32_t budget) {
   if (scene.has_media() && !integrator.sees_media()) return "it does not support participating media";
   if (2 * training_of(integrator) > budget)
@@ -100,7 +101,7 @@ class Trials {
   uint64_t seed_ = 0;
 };
 
-/// The weight of relMSE at each pixel, from the mean brightness of all integrators in the surrounding 3 x 3 pixels.
+/// The weight of relMSE at each sampled pixel, from the mean brightness of all integrators over 3 x 3 sampled pixels.
 std::vector<double> weights_of(std::span<const std::optional<Sampled>> all, int columns) {
   const size_t n = all[0]->means.size();
   std::vector<double> brightness(n), weights(n);

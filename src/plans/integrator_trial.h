@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Chooses the best of several integrators for a render (ours). Each takes a few samples at pixels all over the window,
-// those that learn after a training at the same pixels; the best has the least
+// Chooses the best of several integrators for a render (ours). Each takes a few samples at pixels spread over the
+// window; those that learn are first trained at the same pixels. The best has the least
 //
-//     variance of a sample, relative to the brightness as in relMSE, x rays that a sample takes,
+//     variance of a sample, relative to the brightness as in relMSE, x rays per sample,
 //
-// which is the error for equal work. Counting rays instead of seconds makes the choice independent of the clock. Few
-// samples estimate this only roughly, so another integrator must beat the simplest clearly, and the largest values,
-// from single bright samples, are cut off. Trials have their own random numbers and are not part of the image; they
+// which is the error at equal work. Counting rays instead of seconds makes the choice independent of the clock. Few
+// samples give only a rough estimate, so another integrator must beat the simplest one clearly, and the largest values,
+// from single bright samples, are clamped. Trials have their own random numbers and are not part of the image; they
 // take about a twentieth of the samples.
 #pragma once
 
@@ -19,21 +19,21 @@ struct IntegratorChosen {
   std::vector<IntegratorTrial> trials;           ///< of each of them
 };
 
-/// For a scene whose integrator has choices. The same for any number of threads; if `stop` (may be null) is set
-/// meanwhile, any of them.
+/// For a scene whose integrator has choices. The result does not depend on the number of threads; if `stop` (may be
+/// null) is set during the trials, it may be any of them.
 IntegratorChosen choose_integrator(const LoadedScene& scene, const RenderRequest& request,
                                    const std::atomic<bool>* stop);
 
-/// A request with an integrator that traces itself.
+/// A request with a concrete integrator.
 struct RequestOfChoice {
   RenderRequest request;
   std::vector<IntegratorTrial> trials;  ///< empty if there was nothing to choose
-  double seconds = 0;                   ///< that they took
+  double seconds = 0;                   ///< duration of the trials
 };
 
-/// The request with a chosen integrator if the scene's has choices: its training is subtracted from `spp`
-/// (take_training()), the text below is among its attributes, and the time of the trials is subtracted from `seconds`.
-/// Otherwise the request is unchanged.
+/// If the scene's integrator has choices: the request with the chosen one. Its training is subtracted from `spp`
+/// (take_training()), text_of() is added to the attributes, and the duration of the trials is subtracted from
+/// `seconds`. Otherwise the request is unchanged.
 RequestOfChoice request_of_choice(const LoadedScene& scene, const RenderRequest& request,
                                   const std::atomic<bool>* stop);
 

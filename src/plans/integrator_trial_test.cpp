@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An integrator chosen by trials: the one of least variance x rays, the same for any number of threads; films, replay
-// and continued renders are the chosen one's.
+// An integrator chosen by trials: the one with the least variance x rays, for any number of threads; films, replay and
+// resumed renders use the chosen one.
 #include "plans/integrator_trial.h"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ namespace {
 
 const std::string kRoom = std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml";
 
-/// Radiance 1 give or take a uniform number, for so many rays.
+/// Radiance 1 plus or minus a uniform random number, at a given number of rays.
 class Noisy : public Integrator {
  public:
   Noisy(std::string name, float noise, uint64_t rays) : name_(std::move(name)), noise_(noise), rays_(rays) {}

@@ -16,7 +16,8 @@
 namespace covary {
 namespace {
 
-/// One group has no standard error; a film that is added to the image group by group has the camera's number of them.
+/// A single group has no standard error; a film that is added to the image group by group has the camera's number of
+/// groups.
 int with_error(const Plan& plan, int groups) {
   constexpr int kUsual = 12;
   return groups == 1 && plan.predicts_error && !plan.film_is_image ? kUsual : groups;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The light pass of a plan: whether there is one, how many light paths it takes, and how its film joins the image.
+// The light pass of a plan: whether there is one, its number of light paths, and how its film is added to the image.
 #pragma once
 
 #include <span>
@@ -12,23 +12,23 @@ namespace covary {
 /// Whether a render of the scene by this plan has a light pass.
 bool has_light_pass(const LoadedScene& scene, const Plan& plan, const RenderRequest& request);
 
-/// A clone of the scene's integrator for one render: prepared, and if it traces light, told about pixels and passes.
+/// A clone of the scene's integrator for one render: prepared and, if it traces light, informed of pixels and passes.
 /// Throws Error(kUsage) if it does not fit the request.
 std::shared_ptr<Integrator> prepared_integrator(const LoadedScene& scene, const Plan& plan,
                                                 const RenderRequest& request);
 
-/// The light pass beside these passes of the plan. It has as many groups as the pass with most, and enough for its
-/// standard error if the plan needs one.
+/// The light pass that accompanies these passes of the plan. It has as many groups as the pass with the most, and
+/// enough for its standard error if the plan needs one.
 PassPlan light_pass_plan(const Plan& plan, std::span<const PassPlan> passes);
-/// The same number of groups beside films that were begun, possibly on disk with another number.
+/// The same number of groups for existing films, which may have been begun on disk with another number.
 int light_groups(const Plan& plan, std::span<const Pass> passes);
 
 /// Sets the number of samples of the light pass: as many light paths for the camera samples of these passes as the
 /// integrator's weights assume, rounded to whole bundles for all groups, at least one in each.
 void set_light_target(const Integrator& integrator, std::span<const Pass> cameras, Pass& light);
 
-/// The film of the one camera pass plus the light film, group by group; both must have the same number. The counts are
-/// those of the camera. It cannot be continued, as its attribute film_key::kLight says.
+/// The film of the only camera pass plus the light film, group by group; both must have the same number of groups. The
+/// counts are the camera's. It cannot be resumed, as its attribute film_key::kLight says.
 Film sum_of_films(const Film& camera, const Film& light);
 
 }  // namespace covary

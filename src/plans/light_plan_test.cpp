@@ -30,7 +30,7 @@ using test_support::contains, test_support::corner_text, test_support::LightTrac
 
 constexpr int kWidth = 24, kHeight = 16;
 
-/// A scene whose integrator is `path` and a light tracer, half of the light each.
+/// A scene whose integrator combines `path` and a light tracer, half of the light each.
 LoadedScene light_scene(LightTracing mode = LightTracing::kAuto, double paths = 1) {
   LoadOptions options;
   options.make_integrator = [&](Parameters& parameters) {
@@ -81,7 +81,7 @@ TEST(LightPlan, BesideCrnThereIsOneWhereItIsAskedFor) {
   ASSERT_EQ(on.passes.size(), 3u);
   EXPECT_EQ(on.passes[2].film.groups(), 6);
   EXPECT_EQ(light_paths_of(on), 24u * kWidth * kHeight / 2);
-  // The estimator reads the camera's films; the mean of the light film is added, and so are the variances.
+  // The estimator reads the camera's films; the mean of the light film is added, and so are variances.
   const Film &crn = on.passes[0].film, &independent = on.passes[1].film;
   EstimatorResult expected =
       make_estimator("iicv").apply(rows_of(crn, 0, kHeight), rows_of(independent, 0, kHeight), {12, true});
@@ -123,7 +123,7 @@ TEST(LightPlan, TheImageIsAFilmThatCannotBeContinued) {
   for (int g = 0; g < 6; ++g)
     EXPECT_EQ(film.group_mean(5, 7, g),
               result.passes[0].film.group_mean(5, 7, g) + result.passes[1].film.group_mean(5, 7, g));
-  // Nor is it the film of a pass.
+  // It is not the film of a pass, either.
   request.passes = test_file("passes");
   request.resume = true;
   fs::create_directory(request.passes);
@@ -146,7 +146,7 @@ TEST(LightPlan, AFolderOfPassesHoldsTheLightFilm) {
   EXPECT_TRUE(same_bits(read_film(test_file("passes/light.exr")), light));
   request.spp = 48;
   EXPECT_EQ(light_paths_of(render(scene, plan_of("none", 6), request)), 48u * kWidth * kHeight);
-  // The groups of the films that are there stay.
+  // Existing films keep their number of groups.
   request.spp = 60;
   Plan any = plain_plan(Sampling::kIndependent);
   any.phases[0].passes = [](const PlanState&) {
@@ -155,7 +155,7 @@ TEST(LightPlan, AFolderOfPassesHoldsTheLightFilm) {
     return std::vector{pass};
   };
   EXPECT_EQ(render(scene, any, request).passes[1].film.groups(), 6);
-  // A film of camera samples is no light film.
+  // A film of camera samples is not a light film.
   fs::copy_file(test_file("passes/independent.exr"), test_file("passes/light.exr"),
                 fs::copy_options::overwrite_existing);
   EXPECT_TRUE(contains(message_of([&] { render(scene, plan_of("none", 6), request); }, ErrorCode::kInput),
@@ -183,7 +183,7 @@ TEST(LightPlan, AnyThreadsAndInterruptionsGiveTheSameBits) {
         if (--left <= 0) stop = true;
       };
       const RenderResult result = render(scene, plan, request, callbacks);
-      complete = !result.interrupted;  // all samples may be there, and the image not
+      complete = !result.interrupted;  // all samples may be complete, but not the image
       interruptions += complete ? 0 : 1;
       if (!complete) continue;
       for (int i = 0; i < 3; ++i) EXPECT_TRUE(same_bits(result.passes[i].film, whole.passes[i].film)) << i;

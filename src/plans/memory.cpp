@@ -36,7 +36,7 @@ RenderMemory render_memory(const Plan& plan, std::span<const PassPlan> passes, i
     if (pass.light && plan.film_is_image) memory.estimate += film;  // the sum of both films
   }
   if (aovs) memory.films += n_pixels * std::size(kAuxiliaryImages) * kImageBytes;
-  // For a viewer or the preview.
+  // A copy for a viewer or the preview.
   memory.estimate += plan.estimate_memory.bytes(n_pixels, fewest_groups) + n_pixels * kImageBytes;
   return memory;
 }
@@ -52,7 +52,7 @@ RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const Ren
   RenderMemory memory = render_memory(plan, passes, window.width, window.height, request.aovs || plan.reads_guides);
   memory.training = training_memory(scene, request);
   if (request.splits_layers()) {
-    // Films of all layers, which the denoiser copies, and images of each for each candidate.
+    // Films of all layers, which the denoiser copies, and for each an image per candidate.
     const size_t n = request.layers ? std::size(kLayerNames) : light_groups(*scene.scene).size() + 1;
     const double images = static_cast<double>(n) * (2.0 * passes.back().groups + kImagesOfLayer);
     memory.films += window.width * window.height * images * kImageBytes;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Memory of a render, computed before it is allocated.
+// Memory of a render, estimated before it is allocated.
 #pragma once
 
 #include <span>
@@ -12,8 +12,8 @@ namespace covary {
 
 struct RenderMemory {
   double films = 0;     ///< bytes: samples of all passes, auxiliary images
-  double estimate = 0;  ///< bytes: what the estimator adds, the image included
-  double training = 0;  ///< bytes: maximum for the integrator's training
+  double estimate = 0;  ///< bytes: working memory of the estimator, including the image
+  double training = 0;  ///< bytes: upper bound for the integrator's training
   double total() const { return films + estimate + training; }
 };
 
@@ -23,7 +23,7 @@ RenderMemory render_memory(const Plan& plan, std::span<const PassPlan> passes, i
 /// Bytes that the training of a scene's integrator may take; 0 if it does not learn.
 double training_memory(const LoadedScene& scene, const RenderRequest& request);
 
-/// The same for the passes of the plan's first phase, which depend on the scene and the request only.
+/// The same for the passes of the plan's first phase, which depend only on the scene and the request.
 RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const RenderRequest& request);
 
 /// Throws Error(kUsage) if the render needs more than memory_limit().

@@ -59,7 +59,7 @@ void resume(const RenderRequest& request, Pass& pass) {
   const std::string frame = frame_text(pass.film);
   const int groups = pass.film.groups(), fewest = pass.plan.fewest_groups;
   const std::map<std::string, std::string> attributes = std::move(pass.film.attributes);
-  pass.film = Film();  // two of them might not fit into memory
+  pass.film = Film();  // both might not fit into memory
   Film film = read_film(pass.path);
   const auto differs = [&](const std::string& what, const std::string& old_value, const std::string& new_value) {
     throw Error(ErrorCode::kInput,
@@ -103,7 +103,7 @@ bool is_unfinished_film(const std::string& path) {
     const auto complete = attributes.find(film_key::kComplete);
     return complete != attributes.end() && complete->second == "false" && !attributes.count(film_key::kLight);
   } catch (const Error&) {
-    return false;  // an image like any other
+    return false;  // an ordinary image
   }
 }
 
@@ -187,7 +187,7 @@ void save_passes(const RenderRequest& request, std::span<Pass> passes, bool comp
     pass.film.attributes[film_key::kComplete] = complete ? "true" : "false";
     if (pass.temporary) pass.film.attributes[film_key::kTemporary] = "true";
     write_film(pass.path, pass.film);
-    pass.film.attributes.erase(film_key::kTemporary);  // of the file, not of the film
+    pass.film.attributes.erase(film_key::kTemporary);  // an attribute of the file, not of the film
     if (!request.passes.empty()) write_costs(pass);
   }
 }
@@ -198,7 +198,7 @@ void remove_passes(const RenderRequest& request, std::span<const Pass> passes) {
   for (const Pass& pass : passes)
     if (pass.temporary) any = true, fs::remove(pass.path, ignored);
   const fs::path folder = passes_folder(request);
-  if (any && !fs::is_symlink(folder, ignored)) fs::remove(folder, ignored);  // only when empty
+  if (any && !fs::is_symlink(folder, ignored)) fs::remove(folder, ignored);  // only if empty
 }
 
 namespace {
@@ -207,7 +207,7 @@ using Json = nlohmann::ordered_json;
 
 [[noreturn]] void fail(const std::string& what) { throw Error(ErrorCode::kInput, what); }
 
-/// The member of `costs`, which must be a finite number >= 0.
+/// Member `key` of `costs`, which must be a finite number >= 0.
 template <typename T>
 T amount(const Json& costs, const char* key) {
   const auto it = costs.find(key);

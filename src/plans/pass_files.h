@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Films on disk while a render goes on, and for other estimators afterwards.
+// Films on disk, during a render and afterwards for other estimators.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace covary {
 
-/// Attributes of films besides those of film/film.h.
+/// Attributes of films in addition to those in film/film.h.
 namespace film_key {
 inline constexpr const char* kTemporary = "temporary";     ///< "true": removed once the image of the render is written
 inline constexpr const char* kTrial = "integrator_trial";  ///< the choice and its reason (integrator_trial.h)
@@ -26,21 +26,21 @@ inline constexpr const char* kFrame = "frame";
 /// Whether the result's file is the film itself, which can be continued.
 bool output_is_film(const Plan& plan, const RenderRequest& request);
 
-/// Where the films are while the plan runs; empty if the request names no file.
+/// The folder of the films while the plan runs; empty if the request names no file.
 std::filesystem::path passes_folder(const RenderRequest& request);
 
 /// The file of a pass's film; empty if the request names no file.
 std::string pass_path(const Plan& plan, const RenderRequest& request, const PassPlan& pass);
 
-/// Before rendering: throws Error(kInput) if the request neither resumes nor overwrites, and would restart films of an
-/// interrupted render, at its output or in the folder beside it, or would use that folder although it holds films.
+/// Before rendering: throws Error(kInput) if the request neither resumes nor overwrites, but would restart films of an
+/// interrupted render, at its output or in the folder next to it, or would use that folder although it contains films.
 void check_earlier_films(const Plan& plan, const RenderRequest& request);
 
-/// Looks for a film at pass.path. To resume, the film replaces the empty one, which it must match; if a folder keeps
-/// films, their costs so far are read, too, and invalid ones are ignored with a warning. Returns whether the file is
-/// temporary: it belongs neither to a folder that the request names nor to that of an earlier render. Throws
-/// Error(kInput) for a film that does not match, for a file that is neither resumed nor overwritten, for one that is
-/// not a film, and for a symbolic link, which would lead out of the folder.
+/// Looks for a film at pass.path. When resuming, it replaces the empty film, which it must match; if a folder keeps
+/// films, their accumulated costs are read, too, and invalid ones are ignored with a warning. Returns whether the file
+/// is temporary: it belongs neither to a folder named by the request nor to an earlier render's. Throws Error(kInput)
+/// for a film that does not match, for a file that is neither resumed nor overwritten, for a file that is not a film,
+/// and for a symbolic link, which might lead out of the folder.
 void take_film_on_disk(const Plan& plan, const RenderRequest& request,
                        const std::function<void(const std::string&)>& warn, Pass& pass);
 

@@ -23,7 +23,7 @@ void add(const PassResult& from, PassResult& to) {
   keep_first(to.bad_samples);
 }
 
-/// Fraction of the pass that is done.
+/// Completed fraction of the pass.
 double fraction(const Pass& pass) {
   return pass.count / (pass.plan.light ? pass.wanted : static_cast<double>(pass.settings.spp.largest()));
 }
@@ -37,7 +37,7 @@ uint64_t missing(const Pass& pass) {
   return uint64_t{target - std::min(target, pass.count)} * kBundlePaths;
 }
 
-/// The pass that is farthest behind; null if all are complete.
+/// The pass that is furthest behind; null if all are complete.
 Pass* next_pass(std::span<Pass> passes) {
   Pass* next = nullptr;
   for (Pass& pass : passes)
@@ -45,7 +45,7 @@ Pass* next_pass(std::span<Pass> passes) {
   return next;
 }
 
-/// Samples of a light film at the end of the next round: at most the number that the pass takes in this time, because a
+/// Samples of a light film at the end of the next round: at most what the pass achieves in the given time, because a
 /// round is only useful when complete.
 uint32_t light_limit(const Pass& pass, std::optional<double> seconds) {
   const auto groups = static_cast<uint32_t>(pass.film.groups());
@@ -76,11 +76,11 @@ uint64_t render_passes(const Scene& scene, std::span<Pass> passes, const WaveLim
     if (!wave.estimate) wave.limit = wave_end(pass.count, pass.film.groups());
     if (pass.plan.light) wave.limit = light_limit(pass, {});
     wave.stop = limits.stop;
-    wave.checkpoint = wave.estimate ? limits.wave : nullptr;  // there is only this wave
+    wave.checkpoint = wave.estimate ? limits.wave : nullptr;  // this is the only wave
     wave.progress = [&](uint64_t now, uint64_t) {
       if (limits.progress) limits.progress(done + now, total);
     };
-    if (limits.seconds_left && pass.count > 0) {  // the pass that is farthest behind
+    if (limits.seconds_left && pass.count > 0) {  // the pass that is furthest behind
       wave.seconds = limits.seconds_left();
       if (wave.seconds <= 0) return done;
       if (pass.plan.light) {

@@ -12,7 +12,7 @@ namespace {
 
 const std::string kRoom = std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml";
 
-/// A film of 40 x 30 pixels, two samples of `value` in each.
+/// A film of 40 x 30 pixels with two samples of `value` each.
 Film film_of(const Spectrum& value) {
   Film film(40, 30, {0, 0, 40, 30}, 1);
   for (int y = 0; y < 30; ++y)

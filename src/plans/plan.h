@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plan is what a method renders: successive phases, each with passes that advance together, and how the films become
-// the image. A phase may read the results of earlier phases: films, numbers of samples derived from them, a trained
-// integrator. render() in plans/render.h carries plans out.
+// A plan is what a method renders: successive phases, each with passes that advance together, and the computation of
+// the image from their films. A phase may read results of earlier phases: films, sample counts derived from them, a
+// trained integrator. render() in plans/render.h executes plans.
 #pragma once
 
 #include <atomic>
@@ -30,7 +30,7 @@ struct PassPlan {
   uint32_t number = 0;  ///< PassSettings::pass
   Sampling sampling = Sampling::kIndependent;
   int groups = 1;  ///< of the film
-  /// The number of groups follows from the samples or the speed; a continued film may have any number from this on. 0:
+  /// The number of groups follows from the samples or the speed; a resumed film may have this number or more. 0:
   /// exactly `groups`.
   int fewest_groups = 0;
   bool sample_variance = false;  ///< the film keeps the variance of samples
@@ -39,15 +39,15 @@ struct PassPlan {
   /// random numbers is kLightPass + number.
   bool light = false;
   std::string
-      settings;  ///< of the pass, appended to the integrator's in the film's attribute: all that changes samples
+      settings;  ///< of the pass, appended to the integrator's in the film's attribute: everything that changes samples
   std::string estimator;  ///< attribute of the film if the pass itself makes the image; may be empty
 
   /// "crn", or "crn-2" if its number is not 0.
   std::string id() const { return number == 0 ? name : name + "-" + std::to_string(number); }
 };
 
-/// Result of a trial of common random numbers (split_plan.h): relMSE of denoised images with equally many samples, from
-/// held-out ones; may be negative.
+/// Result of a trial of common random numbers (split_plan.h): relMSE of denoised images with equal numbers of samples,
+/// estimated from held-out samples; may be negative.
 struct SplitTrial {
   double samples = 0;  ///< per pixel, of both passes; 0: there was no trial
   double independent = 0, with_crn = 0;
@@ -63,22 +63,22 @@ struct Pass {
   std::string path;  ///< the film's file; empty if none
   /// The file belongs to this render alone and is removed once the image is written; otherwise it is kept.
   bool temporary = false;
-  uint32_t count = 0;  ///< minimum over the pixels that are to have that many
-  /// For a light pass: the samples that match the camera's, which may exceed what a film can hold if only a time limit
-  /// ends the render.
+  uint32_t count = 0;  ///< minimum over the pixels to be sampled
+  /// For a light pass: the number of samples that matches the camera's; it may exceed what a film can hold if only a
+  /// time limit ends the render.
   double wanted = 0;
   bool misses_error = false;        ///< the plan needs more samples for its target error than it may take
   std::optional<SplitTrial> trial;  ///< of split_plan.h: the basis of its decision
-  PassResult result;  ///< of all calls together, earlier ones included where a folder of passes keeps them
+  PassResult result;                ///< accumulated over all calls, earlier ones included if a folder keeps the passes
 };
 
-/// State that phases read.
+/// State available to phases.
 struct PlanState {
   const LoadedScene& scene;
   const RenderRequest& request;
-  const std::atomic<bool>* stop;  ///< may be null; prepare() returns soon once it is true
-  /// Traces the passes that begin from now on. A phase may replace it, for example by a trained one, whose
-  /// description() then distinguishes the films.
+  const std::atomic<bool>* stop;  ///< may be null; prepare() returns soon after it becomes true
+  /// Traces the passes that begin from now on. A phase may replace it, e.g. with a trained one, whose description()
+  /// then distinguishes the films.
   std::shared_ptr<const Integrator> integrator;
   uint32_t budget = 0;  ///< current target of samples per pixel of all passes together; grows towards a target error
   uint32_t group_budget = 0;  ///< the budget that determines the number of groups; fixed
@@ -94,7 +94,7 @@ struct PlanState {
 struct Phase {
   /// Fraction of the time limit that the phase may use; the fractions of a plan add up to 1.
   double share = 1;
-  /// Optional work before the phase's films are made, such as training. Called once.
+  /// Optional work before the phase's films are created, such as training. Called once.
   std::function<void(PlanState&)> prepare;
   /// The passes, at least one. Called once, after prepare().
   std::function<std::vector<PassPlan>(const PlanState&)> passes;
@@ -103,27 +103,26 @@ struct Phase {
   std::function<void(const PlanState&, std::span<Pass>)> set_targets;
 };
 
-/// What an estimate may read besides the films, for its rows.
+/// What an estimate may read in addition to the films, for its rows.
 struct Beside {
   Guides guides;              ///< if Plan::reads_guides
   std::vector<Layer> layers;  ///< if Plan::splits_layers; empty if none were requested
 };
 
-/// What render() adds if the integrator traces light: a pass "light" beside those of the last phase, which advances
-/// with them, and whose film is added to the image (light_plan.h). Phases and estimate() only see the passes of camera
-/// samples.
+/// If the integrator traces light, render() adds a pass "light" to those of the last phase; it advances with them, and
+/// its film is added to the image (light_plan.h). Phases and estimate() only see the passes of camera samples.
 struct Plan {
   std::string name;       ///< of the estimator, for messages
   std::string estimator;  ///< the same with options, for the image's attribute
   std::string network;    ///< Estimator::network
   std::vector<Phase> phases;
-  /// The image of rows first_row … first_row + n_rows - 1 of the current films. Its cost depends on the size, not on
-  /// counts.
+  /// Computes rows first_row … first_row + n_rows - 1 of the image from the current films. Its cost depends on the
+  /// size, not on sample counts.
   std::function<EstimatorResult(std::span<const Pass>, int first_row, int n_rows, const Beside& beside)> estimate;
   EstimatorMemory estimate_memory;  ///< working memory of estimate() besides the films
-  bool takes_unfinished = false;    ///< estimate() works if some pixels have no samples yet
+  bool takes_unfinished = false;    ///< estimate() works even if some pixels have no samples yet
   bool reads_guides = false;        ///< estimate() reads albedo and normal, which are rendered for it
-  bool splits_layers = false;       ///< estimate() makes EstimatorResult::layers of Beside::layers
+  bool splits_layers = false;       ///< estimate() computes EstimatorResult::layers from Beside::layers
   bool film_is_image = false;       ///< the film of the only pass is the result; estimate() only provides its error
   bool takes_training = false;      ///< the integrator's training samples are part of the image
   bool has_crn_pass = false;        ///< some pass uses common random numbers

@@ -22,7 +22,7 @@ namespace covary {
 namespace {
 
 /// Largest factor from one budget to the next towards a target error; smaller if the predicted error is unreliable, so
-/// that a far too large prediction does not cost that many samples before the next check.
+/// that a prediction that is far too large costs fewer samples before the next check.
 constexpr double kMostGrowth = 4, kDoubtfulGrowth = 2;
 
 std::string filter_text(const FilterSettings& filter) {
@@ -98,7 +98,7 @@ bool PlanRun::render_to_limits() {
   const uint32_t limit = largest_budget(scene_, request_);
   state_.budget = state_.group_budget = rounds_.budget();
   if (timed() && plan_.groups_follow_speed) {
-    // The number that half of the time suffices for, so that no more groups are begun than can be filled.
+    // The number of samples possible in half of the time, so that no more groups are begun than can be filled.
     const double samples =
         0.5 * request_.seconds * samples_per_second(scene_, *state_.integrator, filter_, window_, callbacks_.stop);
     state_.group_budget =
@@ -143,7 +143,7 @@ bool PlanRun::render_phase(size_t index, double share) {
   const Phase& phase = plan_.phases[index];
   if (index == first_of_phase_.size()) begin_phase(phase);
   const std::span<Pass> passes = passes_of(index);
-  if (passes.empty()) return false;  // interrupted before its films were made
+  if (passes.empty()) return false;  // interrupted before its films were created
   if (index + 1 == plan_.phases.size() && needs_aovs() && result_.aovs.empty()) render_auxiliary_images();
   state_.guides = guides();
   if (timed()) state_.seconds_left = request_.seconds - watch_.seconds();
@@ -239,7 +239,7 @@ void PlanRun::between_waves() {
 void PlanRun::warn_of_other_samples(uint32_t asked) const {
   double planned = 0;
   for (const Pass& pass : camera_passes(state_.passes)) {
-    if (pass.settings.spp.is_map()) return;  // its numbers are approximate, or limited by other options
+    if (pass.settings.spp.is_map()) return;  // its counts are approximate, or limited by other options
     planned += pass.settings.spp.largest();
   }
   if (planned != asked && callbacks_.warning)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Implements render(): carries a plan out, once. Only used in plans/.
+// Implements render(): executes a plan once. Only used in plans/.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 
 namespace covary {
 
-/// The phases and files of a render are in plan_run.cpp, the image made of its films in plan_run_image.cpp.
+/// Phases and files of a render are in plan_run.cpp, the image computed from its films in plan_run_image.cpp.
 class PlanRun {
  public:
   PlanRun(const LoadedScene& scene, const Plan& plan, const RenderRequest& request, const RenderCallbacks& callbacks);
@@ -56,7 +56,7 @@ class PlanRun {
   double error_to_limit() const {
     return request_.until_in_blocks ? result_.predicted_blocks : result_.predicted->relmse;
   }
-  /// The film is the image, and its groups tell its error.
+  /// The film is the image, and its groups give its error.
   bool film_has_errors() const {
     return plan_.film_is_image && plan_.predicts_error && state_.passes[0].film.groups() > 1;
   }
@@ -64,7 +64,7 @@ class PlanRun {
   bool needs_estimate() const {
     return !plan_.film_is_image || film_has_errors() || request_.until > 0 || request_.splits_layers();
   }
-  /// Of the whole window; empty if the plan reads none or they do not exist.
+  /// Guides of the whole window; empty if the plan reads none or they do not exist.
   Guides guides() const { return plan_.reads_guides ? guides_among(result_.aovs) : Guides(); }
   bool needs_aovs() const { return request_.aovs || plan_.reads_guides; }
   bool stopped() const { return callbacks_.stop && callbacks_.stop->load(); }
@@ -98,7 +98,7 @@ class PlanRun {
   const FilterSettings filter_;
   const std::shared_ptr<Integrator> integrator_;  // only for this render
   PlanState state_;
-  ErrorRounds rounds_;                  // if an error is wanted
+  ErrorRounds rounds_;                  // if there is a target error
   std::vector<size_t> first_of_phase_;  // index of the first pass of each phase that has begun
   RenderResult result_;
   std::shared_ptr<Integrator> of_layers_;  // with RenderRequest::splits_layers(), like the two below
@@ -107,7 +107,7 @@ class PlanRun {
   uint64_t done_ = 0;         // samples of this call, of earlier phases and rounds
   Stopwatch watch_, since_checkpoint_;
   bool consistent_ = true;                  // the films are in the state between two waves
-  bool unsaved_ = false;                    // they have samples that are not on disk
+  bool unsaved_ = false;                    // they have samples that have not been written
   double estimate_stopped_after_ = 0;       // seconds
   std::optional<double> estimate_seconds_;  // of the next estimate
 };

@@ -26,11 +26,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kTrialRows = 64;            // at least, if the time of the estimate is measured
+constexpr int kTrialRows = 64;            // minimum, if the estimate is timed
 constexpr uint32_t kMostAovSamples = 64;  // per pixel of auxiliary images
-/// Seconds of work after which films are worth writing, even unasked, before the image is made of them.
+/// Seconds of work after which films are worth saving, even unasked, before the image is computed from them.
 constexpr double kWorthKeeping = 10;
-constexpr double kEstimateOfInterrupted = 0.5;  // seconds that it may take; after that the image is the mean
+constexpr double kEstimateOfInterrupted = 0.5;  // seconds allowed for it; after that the image is the mean
 
 }  // namespace
 
@@ -51,9 +51,9 @@ EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows, std::span<cons
   return image;
 }
 
-/// False if interrupted; for a render that was interrupted earlier, if it takes too long.
+/// False if interrupted or, for a render that was interrupted earlier, if it takes too long.
 bool PlanRun::estimate() {
-  // An estimate that took too long before it was stopped is not tried again.
+  // An estimate that was stopped because it took too long is not tried again.
   if (result_.interrupted && estimate_stopped_after_ > kEstimateOfInterrupted) return false;
   begin(RenderStage::kEstimating);
   const Stopwatch watch;
@@ -85,7 +85,8 @@ bool PlanRun::estimate() {
   return true;
 }
 
-/// Predicted seconds of the estimate, from a trial on rows in the middle: it depends on sizes, not on samples.
+/// Predicted duration of the estimate in seconds, from a trial on rows in the middle: it depends on sizes, not on
+/// samples.
 double PlanRun::time_estimate() {
   if (plan_.film_is_image) return 0;  // a mean
   const Stopwatch watch;
@@ -139,14 +140,14 @@ bool PlanRun::try_to_keep_films(bool complete, const char* then) {
   return !unsaved_;
 }
 
-/// Films that took time are written before anything else is done with them.
+/// Saves films that took long before anything else is done with them.
 void PlanRun::keep_films_before_more() {
   const bool asked = !request_.passes.empty();
   if (unsaved_ && (asked || since_checkpoint_.seconds() > kWorthKeeping))
     try_to_keep_films(!stopped(), "the image is made nevertheless");
 }
 
-/// After an error when all films were complete.
+/// After an error, if all films were complete.
 void PlanRun::keep_films_of_failure() noexcept {
   if (!consistent_ || !unsaved_ || done_ == 0 || films().empty() || films()[0].path.empty()) return;
   try {
@@ -155,7 +156,7 @@ void PlanRun::keep_films_of_failure() noexcept {
           output_is_film(plan_, request_)
               ? fmt::format("the film is kept in '{}'; `resume` continues it", request_.output)
               : fmt::format("the films are kept in '{}'; `resume` continues them", passes_folder(request_).string()));
-  } catch (...) {  // no memory for the text of a warning
+  } catch (...) {  // no memory for the warning's text
   }
 }
 
@@ -177,7 +178,7 @@ void PlanRun::write_files() {
     try {
       save_passes(request_, result_.passes, !result_.interrupted);
       unsaved_ = false;
-    } catch (const Error&) {  // the image, which is smaller, may still find room
+    } catch (const Error&) {  // the image is smaller and may still fit
       failure = std::current_exception();
     }
   }

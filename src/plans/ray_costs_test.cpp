@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What samples cost, in rays.
+// Cost of samples, in rays.
 #include "passes/ray_costs.h"
 
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 namespace covary {
 namespace {
 
-/// A box with one open side in front of nothing: paths that miss it are one ray long.
+/// A box with one open side in front of the background: paths that miss it are one ray long.
 TEST(RayCosts, AreHigherWhereThereIsSomething) {
   const LoadedScene scene = load_sized(std::string(COVARY_SOURCE_DIR) + "/scenes/materials.xml", 96, 72);
   const std::shared_ptr<Integrator> integrator = integrator_of(scene).clone();
@@ -22,7 +22,7 @@ TEST(RayCosts, AreHigherWhereThereIsSomething) {
   const std::vector<double> costs = ray_costs(*scene.scene, *integrator, settings, film, nullptr);
   ASSERT_EQ(costs.size(), 96u * 72u);
   EXPECT_NEAR(std::accumulate(costs.begin(), costs.end(), 0.0) / 6912, 1, 0.1);
-  double rays = 0, above = 0;  // of samples where costs are above 1, over the others'
+  double rays = 0, above = 0;  // of pixels where the cost is at most 1, and above it
   double n_rays = 0, n_above = 0;
   for (int y = 1; y < 72; y += 3)
     for (int x = 1; x < 96; x += 3) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Renders a scene by a plan: the one entry point of the command line, of tests and of other programs. It prints
-// nothing, handles no signal, and neither reads nor sets anything global.
+// Executes a plan on a scene: the single entry point for the command line, tests and other programs. It prints nothing,
+// handles no signals, and neither reads nor sets global state.
 #pragma once
 
 #include <atomic>
@@ -40,12 +40,12 @@ struct RenderSeconds {
   double auxiliary = 0;  ///< of rendering auxiliary images
   double train = 0;      ///< of the integrator's training
   double surrogate = 0;  ///< part of it: computing the importance of pixels
-  double solve = 0;      ///< part of it: building what the integrator reads from the samples
+  double solve = 0;      ///< part of it: building the integrator's data structures from the samples
   double trial =
       0;  ///< choosing an integrator by trial and, with a time limit, measuring the speed of passes and estimator
-  double estimate = 0;  ///< after the passes
+  double estimate = 0;  ///< of the final estimate, after the passes
   double write = 0;
-  double limited = 0;  ///< what the time limit counts, in this call
+  double limited = 0;  ///< time that counts towards the limit, in this call
 };
 
 /// The result of an integrator's trial.
@@ -63,8 +63,8 @@ struct RenderResult {
   std::string chosen;
   std::shared_ptr<const Integrator> integrator;  ///< of the last passes, with what it has learnt
   std::vector<Pass> passes;
-  /// If the film itself is the image, at most its standard error. Empty for a render that was interrupted before every
-  /// pixel of every film had samples.
+  /// If the film itself is the image, at most its standard error. Empty for a render interrupted before every pixel of
+  /// every film had samples.
   EstimatorResult image;
   std::optional<PredictedError> predicted;  ///< if there is a standard error
   double predicted_blocks = 0;              ///< of predicted_error.h, likewise
@@ -83,7 +83,7 @@ struct RenderResult {
     for (const Pass& pass : passes) total += static_cast<double>(value(pass));
     return total;
   }
-  /// The same of camera samples alone.
+  /// The same for camera samples only.
   template <typename F>
   double camera_sum(F value) const {
     return sum([&](const Pass& pass) { return pass.plan.light ? 0 : value(pass); });
@@ -95,29 +95,29 @@ struct RenderResult {
   double render_seconds() const {
     return seconds.auxiliary + sum([](const Pass& p) { return p.result.seconds - p.result.estimate_seconds; });
   }
-  /// Time of making the image, both inside and after the passes.
+  /// Time to compute the image, both during and after the passes.
   double estimate_seconds() const {
     return seconds.estimate + sum([](const Pass& p) { return p.result.estimate_seconds; });
   }
-  /// The image, whatever made it; for an interrupted render, the mean of all samples so far.
+  /// The image, however computed; for an interrupted render, the mean of all samples so far.
   Image picture() const;
 };
 
 /// The images of RenderResult::aovs that guide a denoiser; null if missing.
 Guides guides_among(const std::map<std::string, Image>& aovs);
 
-/// The sampler of camera samples: the request's, or the equivalent of the scene's: independent numbers for
+/// The sampler of camera samples: the request's, or the equivalent of the scene's: independent random numbers for
 /// `independent` or none, Sobol' points for each of Mitsuba's stratified and low-discrepancy samplers.
 Sampler sampler_of(const LoadedScene& scene, const RenderRequest& request);
 
-/// Renders, estimates and, if the request names files, writes. `scene` was loaded with an integrator
-/// (integrator_choice.h). An interrupted render leaves films that can be continued and, if any sample was taken, their
+/// Renders, estimates and, if the request names files, writes. `scene` must have been loaded with an integrator
+/// (integrator_choice.h). An interrupted render leaves films that can be resumed and, if any sample was taken, their
 /// image, marked by the attribute covary:complete=false. Throws Error(kUsage) for a request that does not fit the scene
 /// or plan or needs more memory than the machine has, Error(kInput) for films of another render, and Error(kIo).
 RenderResult render(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
                     const RenderCallbacks& callbacks = {});
 
-/// The mean of all samples so far, plus the light film: a picture for a viewer while passes go on.
+/// The mean of all samples so far, plus the light film: an image for a viewer during the passes.
 Image preview_of(std::span<const Pass> passes);
 
 /// One sample of a pass.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The request of a render, besides the plan. Members stand beside the declarations of their options
+// The request of a render, in addition to the plan. Members are next to the declarations of their options
 // (settings/settings.h), so an option of rendering is one member and one line here, and the code that uses it.
 #pragma once
 
@@ -18,7 +18,7 @@ namespace covary {
 
 struct RenderRequest {
   uint64_t seed = 0;
-  /// Replaces the scene's; if that stands for several, the chosen one.
+  /// Replaces the scene's integrator; if that has choices, the chosen one.
   std::shared_ptr<const Integrator> integrator;
   std::optional<FilterSettings> filter;  ///< default: the scene's
   std::optional<Sampler> sampler;        ///< of camera samples; default: sampler_of()
@@ -30,25 +30,25 @@ struct RenderRequest {
   double until = 0;              ///< > 0: add samples until the predicted relMSE is this small
   bool until_in_blocks = false;  ///< `until` means predicted_blocks() of predicted_error.h, not the whole image
   bool aovs = false;             ///< also the images Albedo, N and P
-  /// Also the images Edges01, Edges02, … of the last pass of camera samples (passes/sample_parts.h). Needs the
+  /// Also the images Edges01, Edges02, … of the last pass of camera samples (passes/sample_parts.h). Requires the
   /// integrator controlled-path.
   bool path_lengths = false;
-  /// Also the images Direct and Indirect, which add up to the image (passes/sample_parts.h). Needs an integrator that
+  /// Also the images Direct and Indirect, which sum to the image (passes/sample_parts.h). Requires an integrator that
   /// separates direct light, and a plan that splits layers.
   bool layers = false;
-  /// Instead, the images Combined_GROUP of each group of the scene's lights, and Rest for the others. Needs an
+  /// Instead, images Combined_GROUP for each group of the scene's lights, and Rest for the others. Requires an
   /// integrator that separates lights.
   bool light_groups = false;
   bool splits_layers() const { return layers || light_groups; }
 
   std::string output;    ///< EXR file of the result; empty: no file is written
-  bool preview = false;  ///< also a PNG beside it
+  bool preview = false;  ///< also a PNG next to it
   /// Files of the integrator's training (training_stage.h), written after the training and read instead of it; empty:
   /// none.
   std::string save_training, load_training;
   std::string oidn;               ///< path of Open Image Denoise, for integrators that use it; empty: searched for
   std::string passes;             ///< folder that keeps the films; empty: only while they are unfinished
-  bool resume = false;            ///< continue existing films
+  bool resume = false;            ///< resume existing films
   bool overwrite = false;         ///< films in `passes` may be replaced; without it and `resume` they are an error
   double checkpoint_seconds = 0;  ///< > 0: seconds between writing unfinished films
   /// Images of the window from the caller, written as layers of the output: 1 or 3 channels.
@@ -61,12 +61,12 @@ inline constexpr double kMostSamples = 1 << 30;
 inline constexpr OptionTraits kBasicPasses{.level = OptionLevel::kBasic, .effect = OptionEffect::kPasses};
 inline constexpr OptionTraits kBasicSamples{.level = OptionLevel::kBasic, .effect = OptionEffect::kSamples};
 
-// Parsers: they return what was expected, or an empty text.
+// Parsers: they return what was expected, or "" on success.
 std::string read_until(const std::string& text, RenderRequest& request);
 std::string read_crop(const std::string& text, std::optional<CropWindow>& crop);
 FilterSettings filter_named(const std::string& name);
 
-/// How long the render goes on, and where the image goes.
+/// Options for when the render ends and where the image goes.
 inline void declare_goal(Settings& s, RenderRequest& r) {
   s.group("Rendering");
   s.text("output", r.output, "FILE", "The image (EXR); a PNG preview appears beside it",

@@ -144,12 +144,12 @@ std::vector<std::string> replay_words(OptionValues values, const Pass& pass, con
   for (const Option& option : options)
     if (option.effect != OptionEffect::kSamples && !(option.name == "oidn" && is_by_oidn)) values.erase(option.name);
   values["seed"] = std::to_string(pass.settings.seed);
-  if (values.contains("integrator")) values["integrator"] = registered_name(*pass.integrator);  // which may be a choice
+  if (values.contains("integrator")) values["integrator"] = registered_name(*pass.integrator);  // the one chosen
   const bool is_crn = pass.settings.sampling == Sampling::kCrn, is_sobol = pass.settings.sampler == Sampler::kSobol;
   if (!pass.plan.light) values["sampling"] = is_crn ? "crn" : "independent";
   if (is_sobol) values["groups"] = std::to_string(pass.settings.groups);
   if (is_sobol || values.contains("sampler")) values["sampler"] = sampler_name(pass.settings.sampler);
-  // The weights of techniques depend on whether light is traced.
+  // The weights of sampling strategies depend on whether light is traced.
   if (pass.integrator->light_tracing()) values["light-tracing"] = light_tracer(*pass.integrator) ? "on" : "off";
   const std::vector<Option> of_integrators = options_of_integrators();
   options.insert(options.end(), of_integrators.begin(), of_integrators.end());

@@ -33,18 +33,20 @@ Estimator estimator_of(const RenderSettings& settings, const OptionValues& of_es
 /// The plan of that estimator, with the passes that the settings choose. Throws Error(kUsage).
 Plan render_plan(const RenderSettings& settings, const OptionValues& of_estimator);
 
-/// The request, with the settings that the scene's integrator takes. Throws Error(kUsage) for an option without a user.
+/// The request, with the settings that the scene's integrator takes. Throws Error(kUsage) for options that nothing
+/// uses.
 RenderRequest request_of(const RenderSettings& settings, const LoadedScene& scene);
 
 /// Subtracts the samples of the integrator's training, if any, from those of the passes, if their number is known.
 /// Throws Error(kUsage) if none are left.
 void take_training(const LoadedScene& scene, RenderRequest& request);
 
-/// The words after `covary render SCENE` that repeat one sample of a pass. `given`: options of rendering and of the
+/// The arguments after `covary render SCENE` that replay one sample of a pass. `given`: options of rendering and of the
 /// integrator.
 std::vector<std::string> replay_words(OptionValues given, const Pass& pass, const BadSample& sample);
 
-/// The options that determine the samples of passes, as words: equal words mean equal passes, whatever is made of them.
+/// The options that determine the samples of passes, as words: equal words mean equal passes, whatever is computed from
+/// them.
 std::vector<std::string> pass_words(OptionValues given, const OptionValues& of_integrator, OptionValues of_estimator);
 
 }  // namespace covary

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options of rendering: their texts, what is wrong with them, and which passes they mean.
+// Options of rendering: parsing, errors, and the passes they result in.
 #include "plans/render_settings.h"
 
 #include <fmt/format.h>
@@ -79,7 +79,7 @@ TEST(RenderSettings, TheDefaultIsDenoisedAndANamedEstimatorIsNot) {
   EXPECT_EQ(estimator_of(settings_from<RenderSettings>({{"oidn", "off"}}), {}).text, "none --denoise auto --oidn off");
 }
 
-/// Two methods of a suite may share films where these are equal.
+/// Two methods of a suite may share films if these are equal.
 TEST(RenderSettings, WordsOfPassesLeaveOutWhatOnlyTheImageNeeds) {
   const Words standard = pass_words({}, {}, {}), pair = pass_words({{"estimator", "iicv"}}, {}, {});
   EXPECT_EQ(pair, Words{"pair"});
@@ -100,7 +100,7 @@ TEST(RenderSettings, WordsOfPassesLeaveOutWhatOnlyTheImageNeeds) {
   const auto more = [](const OptionValues::value_type& option) {
     return pass_words({{"estimator", "iicv"}, option}, {}, {});
   };
-  // The same option leaves the passes of one estimator as they are and changes those of another.
+  // The same option affects the passes of one estimator but not of another.
   EXPECT_NE(of_estimator("dependent-tests", {{"paper", ""}}), of_estimator("dependent-tests", {}));
   EXPECT_EQ(of_estimator("dependent-tests", {{"window", "5"}}), of_estimator("dependent-tests", {}));
   for (const Words& other :

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plans carried out without a command line: results, phases, stop token, resuming, files.
+// Plans executed without a command line: results, phases, stop token, resuming, files.
 #include "plans/render.h"
 
 #include <gtest/gtest.h>
@@ -54,7 +54,7 @@ TEST(Render, ACropOutsideTheFrameAndImpossibleLimitsAreUsageErrors) {
   EXPECT_THROW(render(scene, samples_plan(make_estimator("polynomials", {{"dimensions", "2"}})), request), Error);
 }
 
-/// An estimate that is stopped begins once more, for an image of what there is, but not where it had taken long.
+/// An estimate that is stopped is restarted for an image of the samples so far, unless it had taken long.
 TEST(Render, AnEstimateThatTookLongUntilItWasStoppedIsNotMadeAgain) {
   const LoadedScene scene = load_sized(kRoom);
   for (const auto& [milliseconds, expected] : {std::pair(0, 2), std::pair(700, 1)}) {
@@ -132,7 +132,7 @@ TEST(Render, ProgressCountsAllSamplesOfTheCall) {
   EXPECT_EQ(last, 24u * 40 * 30);
 }
 
-// Each learns other things, from another seed and crop; a training that the scene's integrator held would be shared.
+// Each learns something else, from another seed and crop; training held by the scene's integrator would be shared.
 TEST(Render, TwoThreadsMayRenderOneSceneThatLearns) {
   for (const char* name : {"controlled-path", "guided-path", "bdpt"}) {
     LoadOptions options;
@@ -176,7 +176,7 @@ TEST(Render, ReplayGivesTheSampleOfThePassOfThatNumber) {
   EXPECT_THROW(replay(scene, plan, request, {Sampling::kIndependent, 3, 40, 13, 0}), Error);
 }
 
-/// A CRN pass of 12 samples, then an independent one that has more samples the brighter the first image is.
+/// A CRN pass of 12 samples, then an independent one with more samples the brighter the first image is.
 Plan two_phases(int& trainings) {
   Plan plan = average_plan();
   plan.phases.resize(2);
@@ -235,7 +235,7 @@ TEST(Phases, AnInterruptedPhaseResumesToTheSameBits) {
   const RenderResult whole = render(scene, two_phases(trainings), request);
   request.passes = folder.file("films");
   request.resume = true;
-  for (int tiles : {3, 20, 1000}) {  // in the first phase, in the second, never
+  for (int tiles : {3, 20, 1000}) {  // interrupts the first phase, the second, neither
     StopAfter stop(tiles);
     const RenderResult part = render(scene, two_phases(trainings), request, stop.callbacks);
     EXPECT_EQ(part.interrupted, tiles < 1000);
@@ -309,7 +309,7 @@ TEST(Budget, OnTheWayToAnErrorGroupsAreEqualUpToTheLimit) {
   EXPECT_EQ(taken(plain_plan(Sampling::kIndependent), request)[0], (std::pair<uint32_t, int>{95, 12}));
 }
 
-/// A larger number of samples would have another number of groups, had it been asked for at once.
+/// A larger number of samples would have resulted in another number of groups, if requested at once.
 TEST(Budget, AContinuedFilmKeepsItsGroups) {
   const LoadedScene scene = load_sized(kRoom);
   const TemporaryFolder folder;

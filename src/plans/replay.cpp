@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One sample or light path of a render, alone.
+// Replays a single sample or light path of a render.
 #include <fmt/format.h>
 
 #include "core/error.h"
@@ -41,7 +41,7 @@ std::vector<ReplayedSample> replay(const LoadedScene& scene, const Plan& plan, c
   const auto integrator = prepared_integrator(scene, plan, request);
   const FilterSettings filter = request.filter.value_or(scene.filter);
   RenderSeconds seconds;
-  // Like the render: sums for two halves of the image round differently from sums for one.
+  // As in the render: sums for two halves of the image round differently from sums for one.
   TrainingImage image;
   TrainingSettings training{window_of(scene, request), filter, nullptr, nullptr, {}};
   if (plan.takes_training) training.image = &image;

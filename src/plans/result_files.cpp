@@ -22,7 +22,7 @@ std::string preview_path(const std::string& output) {
 void write_result_files(const Plan& plan, const RenderRequest& request, RenderResult& result) {
   if (request.output.empty()) return;
   std::map<std::string, Image> aovs = result.aovs;
-  if (!request.aovs)  // only the estimator asked for these
+  if (!request.aovs)  // only needed by the estimator
     for (const char* name : kAuxiliaryImages) aovs.erase(name);
   aovs.insert(request.beside.begin(), request.beside.end());
   Film& last = result.passes[camera_passes(result.passes).size() - 1].film;

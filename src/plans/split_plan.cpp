@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kTrialShare = 1.0 / 8;  // of the samples
 constexpr double kCrnShare = 1.0 / 4;    // fraction of the trial's samples, and of all if it wins
-/// Samples per pixel from which on common random numbers were found to win (docs/notes/denoising.md).
+/// Least samples per pixel at which common random numbers were found to win (docs/notes/denoising.md).
 constexpr uint32_t kFewestTried = 256;
 
 struct Method {
@@ -48,7 +48,7 @@ std::string reason(const SplitTrial& trial) {
       trial.with_crn, trial.independent);
 }
 
-/// The pair, if there is a CRN film.
+/// Denoises the pair if there is a CRN film, otherwise the mean.
 EstimatorResult denoised(const Method& method, const Film* crn, const Film& independent, PairSettings settings,
                          int first_row, int n_rows) {
   settings.std_error = true;
@@ -83,7 +83,7 @@ EstimatorResult estimate(const Method& method, std::span<const Pass> passes, int
                          const Beside& beside) {
   const size_t half = passes.size() / 2;
   const Film independent = joined(passes[0].film, passes[half].film);
-  const std::optional<SplitTrial>& trial = passes[half].trial;  // films that were read know it
+  const std::optional<SplitTrial>& trial = passes[half].trial;  // stored in films read from disk
   const bool crn_wins = trial ? trial->crn_wins : half > 1 && passes[half + 1].film.mean_count() > 0;
   std::optional<Film> crn;
   if (crn_wins) crn = joined(passes[1].film, passes[half + 1].film);
@@ -102,7 +102,7 @@ std::vector<PassPlan> passes_of(const Method& method, const PlanState& state, co
   return passes;
 }
 
-/// Of the first phase: whole groups; zero without a trial.
+/// For the first phase: whole groups; zero without a trial.
 void set_first_targets(const PlanState& state, std::span<Pass> passes) {
   for (size_t i = 0; i < passes.size(); ++i) {
     const double groups = passes[i].film.groups();
@@ -112,7 +112,7 @@ void set_first_targets(const PlanState& state, std::span<Pass> passes) {
   }
 }
 
-/// Of the last phase.
+/// For the last phase.
 void set_last_targets(const Method& method, const PlanState& state, std::span<Pass> passes) {
   if (!passes[0].trial) passes[0].trial = trial_of(method, state);
   double before = 0;

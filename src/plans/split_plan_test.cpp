@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plans that find out whether common random numbers pay: the trial, what it decides, and the samples after it.
+// Plans that determine whether common random numbers pay off: the trial, its decision, and the samples after it.
 #include "plans/split_plan.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using test_support::contains, test_support::message_of, test_support::TemporaryF
 
 const std::string kRoom = std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml";
 
-/// The mean of the independent image, said to have this error; `pair`: one brighter.
+/// The mean of the independent image, with this claimed error; `pair`: one brighter.
 Estimator said_to_err(double relmse, bool pair) {
   Estimator estimator;
   estimator.passes = pair ? EstimatorPasses::kPair : EstimatorPasses::kIndependent;
@@ -55,8 +55,8 @@ TEST(SplitPlan, NothingIsTriedWithFewSamples) {
   }
 }
 
-/// The trial has an eighth of the samples, a fourth of it with common random numbers; three fourths of the samples have
-/// 4/3 of the error of all, so that a pair with 0.8 of it has more.
+/// The trial has an eighth of the samples, a quarter of it with common random numbers; with three quarters of the
+/// samples the error is 4/3 of that of all, so a pair with 0.8 of it loses.
 TEST(SplitPlan, ATrialDecides) {
   const LoadedScene scene = load_sized(kRoom, 16, 12);
   const uint32_t spp = 256;

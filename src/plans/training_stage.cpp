@@ -27,7 +27,7 @@ bool train(const LoadedScene& scene, const RenderRequest& request, Integrator& i
   LearningIntegrator* learning = integrator.learning();
   settings.seed = request.seed;
   const bool by_oidn = learning && learning->pilot_by_oidn();
-  if (by_oidn && request.load_training.empty()) denoiser_info({request.oidn});  // throws before rendering
+  if (by_oidn && request.load_training.empty()) denoiser_info({request.oidn});  // throws before rendering starts
   settings.importance = [&, by_oidn](const Film& film) {
     const Stopwatch surrogate;
     const std::optional<DenoiseOptions> oidn = by_oidn ? std::optional(DenoiseOptions{request.oidn}) : std::nullopt;
@@ -78,7 +78,7 @@ std::vector<Spectrum> pixel_importance(const Scene& scene, const FilterSettings&
 
 namespace {
 
-/// The integrator, if its training can be saved; throws otherwise.
+/// The integrator, if its training can be saved; otherwise throws.
 template <typename Learning>
 Learning& keeper(Learning* learning) {
   if (!learning || !learning->keeps_training())
@@ -87,7 +87,7 @@ Learning& keeper(Learning* learning) {
   return *learning;
 }
 
-/// What was learnt from.
+/// Identifies what the training depends on.
 std::string key(const std::string& scene_hash, const LearningIntegrator& integrator) {
   return scene_hash + "; " + integrator.settings_text();
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Training of a scene's integrator before the phases of a plan, and what its samples add to the image.
+// Training of a scene's integrator before the phases of a plan, and the contribution of its samples to the image.
 #pragma once
 
 #include <atomic>
@@ -17,7 +17,7 @@
 
 namespace covary {
 
-/// Trains a prepared integrator of the scene if it learns, or reads the request's training file; saves it if the
+/// Trains a prepared integrator of the scene if it learns, or loads the request's training file; saves it if the
 /// request names a file. Sets settings.importance and seed, and the training's part of `seconds`. False if stopped.
 bool train(const LoadedScene& scene, const RenderRequest& request, Integrator& integrator, TrainingSettings settings,
            RenderSeconds& seconds);
@@ -26,9 +26,9 @@ bool train(const LoadedScene& scene, const RenderRequest& request, Integrator& i
 /// training's image has approximately the variance of that many samples of the film.
 void add_training(const Film& film, const TrainingImage& training, int first_row, EstimatorResult& image);
 
-// What integrators that learn are told about the image before they begin.
+// What integrators that learn are told about the image before training.
 
-/// Weight of an error in each channel of each pixel, so that relative errors count alike: 1 / √(value² + 0.01), with
+/// Weight of an error in each channel of each pixel, so that relative errors count equally: 1 / √(value² + 0.01), with
 /// the value of the denoised film ([Hua2023] Eq. 25) and the constant of relMSE. Denoised by joint_bilateral(), or with
 /// `oidn` by Open Image Denoise, which must then be installed. Empty if stopped.
 std::vector<Spectrum> pixel_importance(const Scene& scene, const FilterSettings& filter, const Film& film,
@@ -36,8 +36,8 @@ std::vector<Spectrum> pixel_importance(const Scene& scene, const FilterSettings&
 
 // Training files (docs/file-formats.md).
 
-/// Writes what a trained integrator has learnt in the scene with this hash. Throws Error(kUsage) if it learns nothing
-/// that can be saved (LearningIntegrator::keeps_training), and Error(kIo).
+/// Writes what a trained integrator has learnt in the scene with this hash. Throws Error(kUsage) if its training cannot
+/// be saved (LearningIntegrator::keeps_training), and Error(kIo).
 void save_training(const std::string& scene_hash, const Integrator& integrator, const std::string& path);
 
 /// Loads it into a prepared integrator, which is then not trained. Throws Error(kUsage) likewise, Error(kIo), and
