@@ -79,7 +79,7 @@ void check_explain(const CombineOptions& o, const Estimator& estimator, const Gr
                             o.explain->y, window.width, window.height, window.x, window.y));
 }
 
-/// The parts of one pixel: f, and for each control variate its place, coefficients, CRN mean and independent mean.
+/// The terms of one pixel: f and, for each control variate, its position, coefficients, CRN mean and independent mean.
 nlohmann::ordered_json explain(const CombineOptions& o, const CombineRequest& request) {
   const CropWindow& window = request.independent.origin.place.window;
   const int x = o.explain->x - window.x, y = o.explain->y - window.y;
@@ -120,9 +120,9 @@ nlohmann::ordered_json json_of(const Correlation& c) {
 
 /// The layers of --guides.
 struct GuideImages {
-  std::optional<Image> albedo, normal;                      // of the first surface, where the file has both
-  std::optional<Image> denoising_albedo, denoising_normal;  // behind mirrors and glass
-  bool clean = false;                                       // a film's own
+  std::optional<Image> albedo, normal;                      // first hits, if the file has both
+  std::optional<Image> denoising_albedo, denoising_normal;  // first rough surfaces behind mirrors and glass
+  bool clean = false;                                       // without noise, as in covary's own films
   std::optional<Image> position;
   Guides view() const {
     const auto or_null = [](const std::optional<Image>& image) { return image ? &*image : nullptr; };

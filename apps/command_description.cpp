@@ -29,7 +29,7 @@ std::string names_of(const std::set<CLI::Option*>& options) {
   return text;
 }
 
-/// Checks and actions of the parser, behind the description.
+/// The description, followed by the default, "(required)" and the options that this one needs or excludes.
 std::string text_of(const CLI::Option& option) {
   std::string text = option.get_description();
   if (option.get_items_expected_max() > 0 && !option.get_default_str().empty())
@@ -47,7 +47,7 @@ OptionDescription describe_option(const CLI::Option& option) {
   result.text = text_of(option);
   result.group = option.get_group();
   if (option.get_items_expected_max() == 0) return result;
-  // The parser writes the type first, then what its checks say: "TEXT:{a,b}".
+  // CLI11 writes the type first, then what its validators say: "TEXT:{a,b}".
   const std::string type = option.get_type_name();
   const size_t open = type.find('{'), close = type.find('}');
   result.value = option.get_positional() ? option.get_name(true) : type.find(":{") == std::string::npos ? type : "TEXT";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The program's commands and options as plain data, read from the command-line parser: the source of the man page,
+// The program's commands and options as plain data, extracted from the command-line parser: the source of the man page,
 // shell completions and help.
 #pragma once
 
@@ -28,7 +28,7 @@ struct CommandDescription {
   std::vector<OptionDescription> options, positionals;
 };
 
-/// The text behind the option in the help: its choices, or its placeholder.
+/// The text after the option in the help: its choices, or its placeholder.
 std::string value_text(const OptionDescription& option);
 
 /// The options of `app` itself.
@@ -44,7 +44,7 @@ std::vector<std::string> groups_of(const CommandDescription& command);
 /// The help of a command, in lines of at most 100 columns; without `all`, only kBasicOptions.
 std::string help_text(const CLI::App& app, const std::string& name, bool all);
 
-/// A page of section 1 of the manual, in the macros of man(7).
+/// A man page (section 1), in man(7) macros.
 std::string man_page(const CLI::App& app, const std::string& version);
 
 /// Completion script for `shell`: bash, zsh or fish. Throws Error(kUsage) for any other.

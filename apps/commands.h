@@ -22,7 +22,7 @@ void add_denoise(CLI::App& app);
 void add_experiment(CLI::App& app);
 void add_view(CLI::App& app);
 void add_help(CLI::App& app);
-/// All of them, with the help of the program.
+/// Adds all subcommands, and the program's help.
 void add_commands(CLI::App& app);
 
 /// Exit code if a target error was not reached.

@@ -37,7 +37,7 @@ struct Comparison {
   double reference_mean() const { return results[0].reference_mean; }
 };
 
-/// Keeps bands of rows in memory, and the map if requested.
+/// Checks that the bands of rows, and the map if requested, fit in memory.
 void require_memory_to_compare(const CompareOptions& options, const std::string& path, const ComparedRows& rows,
                                size_t n_images) {
   constexpr double kImage = 3 * sizeof(float), kFlip = 120;  // metrics/flip.cpp
@@ -114,7 +114,7 @@ void print_table(const CompareOptions& options, const std::vector<Comparison>& c
   }
 }
 
-/// E.png for one image; E-<name>.png for several, with a number where names repeat.
+/// E.png for one image; E-<name>.png for several, with a number if names repeat.
 std::vector<std::string> map_paths(const CompareOptions& options) {
   if (options.images.size() == 1) return {options.error_map};
   const std::filesystem::path path(options.error_map);
@@ -167,7 +167,7 @@ void check_options(const CompareOptions& options) {
 
 void check_files(const CompareOptions& options) {
   Outputs outputs;
-  // Checked first, because "--json a.exr" takes the image for the name of the JSON file.
+  // Checked first, because "--json a.exr" would take the image for the JSON file.
   if (options.json) outputs.writes("--json", *options.json, OutputKind::kText);
   outputs.reads(options.images);
   outputs.reads(options.reference);

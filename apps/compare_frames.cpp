@@ -23,7 +23,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// One sequence: its errors frame by frame.
+/// Errors of one sequence, frame by frame.
 struct ComparedSequence {
   std::string pattern;
   std::vector<std::vector<double>> metrics;  ///< of each frame, in the order requested
@@ -50,7 +50,7 @@ ComparedSequence compare_sequence(const CompareOptions& o, const std::string& pa
     const std::vector<std::string> reference_paths = references_of(o, frame);
     const ImagePlace place = inspect_image(path).place;
     constexpr double kImages = 8 * 3 * sizeof(float),
-                     kFlip = 2 * 120;  // two frames, their references; metrics/flip.cpp
+                     kFlip = 2 * 120;  // two frames and their references; metrics/flip.cpp
     require_image_memory(path, place.window.width, place.window.height, kImages + kFlip);
     PlacedImage image = read_image(path, o.layer);
     std::vector<PlacedImage> sources;

@@ -8,7 +8,7 @@
 
 namespace covary {
 
-/// Of `covary compare`.
+/// Options of `covary compare`.
 struct CompareOptions {
   std::vector<std::string> images;
   std::string reference, reference2, layer, error_map, frames, baseline;
@@ -17,10 +17,10 @@ struct CompareOptions {
   std::optional<std::string> json;  // "" and "-": standard output
 };
 
-/// Whether the images are names with '#'. Throws Error(kUsage) if only some are, or options do not fit.
+/// Whether the images are patterns with '#'. Throws Error(kUsage) if only some are, or if options do not fit.
 bool compares_frames(const CompareOptions& options);
 
-/// Prints a table of the frames' errors, and writes the requested JSON. References without a '#' are used for all
+/// Prints a table of the frames' errors, and writes JSON if requested. References without a '#' are used for all
 /// frames.
 void compare_frames(const CompareOptions& options);
 

@@ -31,7 +31,7 @@ std::vector<std::vector<std::string>> warn_of_comparison(const std::vector<std::
     std::vector<std::string>& found = result.emplace_back(of_references);
     append(image_warnings(image), found);
     for (const ImageFacts& reference : facts) append(comparison_warnings(image, reference), found);
-    if (facts.size() == 1) append(reference_warnings(image, facts[0]), found);  // the noise of two of them cancels
+    if (facts.size() == 1) append(reference_warnings(image, facts[0]), found);  // with two, their noise cancels
   }
   std::set<std::string> printed;
   for (const auto& warnings : result)

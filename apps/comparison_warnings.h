@@ -7,8 +7,8 @@
 
 namespace covary {
 
-/// Reasons in the files to doubt each image, or its errors against the references (none, one or two); those of the
-/// references come first. Everything is printed once as a warning.
+/// Prints, as warnings, reasons in the files to doubt each image or its errors against the references (none, one or
+/// two); reasons about the references come first. Each is printed once. Returns those of each image.
 std::vector<std::vector<std::string>> warn_of_comparison(const std::vector<std::string>& images,
                                                          const std::vector<std::string>& references);
 

@@ -62,7 +62,7 @@ std::string bash_script(const std::vector<CommandDescription>& commands) {
     }
     options += fmt::format("    {}) options={} ;;\n", command.name, quoted(fmt::format("{}", fmt::join(names, " "))));
   }
-  // If the answer is empty, readline offers files (-o default).
+  // If there is no match, readline completes file names (-o default).
   return "# bash completion for covary, made by `covary help --completion bash`\n"
          "_covary() {\n"
          "  local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} options='' values=none\n"
@@ -104,7 +104,7 @@ std::string zsh_option(const OptionDescription& option) {
   const std::string text = "[" + escaped(option.text, "[]:\\") + "]";
   std::string result;
   for (const std::string& name : option.names) {
-    // A star: the option may be given again. Long names take their value after "=" or as the next word.
+    // A star: the option may be repeated. Long names take their value after "=" or as the next word.
     const std::string equals = option.value.empty() ? "" : name.starts_with("--") ? "=" : "+";
     result += " \\\n        " + quoted("*" + name + equals + text + value);
   }

@@ -36,7 +36,7 @@ struct ConvertOptions {
   ChecksumPolicy checksums() const { return accept_changed ? ChecksumPolicy::kIgnore : ChecksumPolicy::kCheck; }
 };
 
-/// The mean of the channels in the colours of error maps; prints their scale, but not for each frame of a video.
+/// The mean over channels in the colours of error maps; prints their scale, except for frames of a video.
 Image in_false_colours(const Image& image, const std::string& output) {
   Image mean(image.width, image.height, 1);
   for (size_t i = 0; i < mean.data.size(); ++i) {
@@ -48,7 +48,7 @@ Image in_false_colours(const Image& image, const std::string& output) {
   return colour_errors(mean, scale);
 }
 
-/// The images from left to right, aligned at the top, with black below shorter ones.
+/// The images side by side, top-aligned, with black below shorter ones.
 Image side_by_side(const std::vector<Image>& images) {
   int width = 0, height = 0;
   for (const Image& image : images) {
@@ -65,7 +65,7 @@ Image side_by_side(const std::vector<Image>& images) {
   return result;
 }
 
-/// The attributes of the new image: none of the single ones' for several images; none of covary's for a changed one.
+/// Attributes of the new image: none are inherited from several images; covary's are dropped if the image was changed.
 std::map<std::string, std::string> attributes_of(const ConvertOptions& options) {
   std::map<std::string, std::string> attributes;
   if (options.files.size() == 2 && !options.accept_changed)
@@ -81,7 +81,8 @@ std::map<std::string, std::string> attributes_of(const ConvertOptions& options) 
   return attributes;
 }
 
-/// Whether the file is a picture that can be made again, according to itself: an EXR by this command, a PNG by any.
+/// Whether the file, according to its metadata, can be made again: an EXR written by this command, or any PNG of
+/// covary.
 bool is_own_picture(const std::string& path) {
   if (lower_extension(path) == ".png") return is_own_png(path);
   if (lower_extension(path) != ".exr") return false;
@@ -107,7 +108,7 @@ void check_not_lost(const ConvertOptions& options) {
                           output));
 }
 
-/// What is made from the images: one image side by side if there are several, and a copy to write.
+/// Checks memory for the result: one image side by side if there are several, and a copy for writing.
 void check_memory(const std::vector<Image>& images, const std::string& output) {
   constexpr double kPixel = 3 * sizeof(float);
   int width = 0, height = 0;

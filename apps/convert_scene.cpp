@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// covary convert-scene: a scene of any supported format to Mitsuba's XML.
+// covary convert-scene: converts a scene of any supported format to Mitsuba XML.
 #include "io/convert_scene.h"
 
 #include <fmt/format.h>
@@ -36,8 +36,8 @@ bool holds(const std::string& path, std::string_view bytes) {
   return file.text() == bytes;
 }
 
-/// Meshes first, the scene last: once it exists, so do all files that it names. Mesh files are named by content, so a
-/// scene that is being replaced stays complete until the last moment.
+/// Meshes first, the scene last: when it exists, so do all files that it references. Mesh files are named by content,
+/// so an existing scene stays intact until it is replaced.
 void write_files(const ConvertSceneOptions& options, const ConvertedScene& scene) {
   const fs::path folder = fs::path(options.output).parent_path();
   for (const SceneDocumentFile& file : scene.document.files) {

@@ -12,7 +12,7 @@
 namespace covary {
 namespace {
 
-constexpr int kMostTexts = 1000;  ///< that may follow an option which repeats
+constexpr int kMostTexts = 1000;  ///< upper bound on values of a repeatable option
 
 /// "--cv-grid", "-o,--output".
 std::string names_of(const Option& option) {
@@ -25,10 +25,10 @@ std::string names_of(const Option& option) {
   return names;
 }
 
-/// What the help shows behind the name.
+/// What the help shows after the name.
 std::string value_name(const Option& option) {
   if (option.type == Option::Type::kChoice) return fmt::format("{{{}}}", fmt::join(option.choices, ","));
-  // Of a text that may also be a word: "off|LIBRARY".
+  // A text that may also be a keyword: "off|LIBRARY".
   if (const char* named = value_name_of(option.names))
     return option.form.ends_with(std::string("|") + named) ? option.form : named;
   if (option.type == Option::Type::kText) return option.form;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options that a component declares (settings/settings.h) on the command line.
+// Command-line options declared by components (settings/settings.h).
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -11,8 +11,8 @@
 
 namespace covary {
 
-/// Adds the options to the command: values given on its command line are put into `values`, by names without dashes,
-/// and checked according to the declaration. `values` must live as long as the command.
+/// Adds the options to the command: values given on the command line are stored in `values`, by names without dashes,
+/// and checked against the declaration. `values` must outlive the command.
 void add_options(CLI::App& command, const std::vector<Option>& options, OptionValues& values);
 
 /// Adds an option with a value; `kind` is its placeholder in the help.

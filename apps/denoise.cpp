@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// covary denoise: an image denoised by Open Image Denoise; several renders, or a film with groups, by mixtures that
-// their halves judge.
+// covary denoise: denoises an image with Open Image Denoise; several renders, or a film with groups, with mixtures that
+// are judged by their halves.
 #include "denoising/denoise.h"
 
 #include <fmt/format.h>
@@ -35,7 +35,7 @@
 namespace covary {
 namespace {
 
-/// --mode: Open Image Denoise alone, or the goal of a mixture.
+/// --mode: Open Image Denoise alone, or the objective of a mixture.
 constexpr const char* kNetwork = "oidn";
 
 struct Options {
@@ -44,12 +44,12 @@ struct Options {
   std::vector<std::string> layers;
   bool no_guides = false, clean_guides = false, check = false, quiet = false, force = false;
   FrameOptions of_frames;
-  std::shared_ptr<const History> history;  ///< of one frame
+  std::shared_ptr<const History> history;  ///< of the frame being denoised
 
   DenoiseOptions denoiser() const { return {oidn}; }
 };
 
-/// --check: which library is used.
+/// --check: prints which library is used.
 void check(const Options& o) {
   const DenoiserInfo info = denoiser_info(o.denoiser());
   fmt::print("Open Image Denoise {}\n{}\n", info.version, info.path);
@@ -123,7 +123,7 @@ void denoise_by_network(const Options& o, const GuideLayers& guides, ProgressLin
   const Stopwatch watch;
   const std::string& input = o.inputs[0];
   const ImageInfo info = inspect_image(input);
-  constexpr double kImages = 4 * 3 * sizeof(float), kNetworkBytes = 600;  // per pixel; image, guides, result
+  constexpr double kImages = 4 * 3 * sizeof(float), kNetworkBytes = 600;  // per pixel: image, guides and result
   require_image_memory(input, info.place.window.width, info.place.window.height, kImages + kNetworkBytes);
   const PlacedImage image = read_image(input);
   warn_of_values(input, image.image);
@@ -181,7 +181,7 @@ void denoise_by_mixture(const Options& o, const GroupedFile& file, const GuideLa
   print_risks(combined, choice);
 }
 
-/// Whatever the image is.
+/// Whether the options select the network alone, whatever the image.
 bool is_by_network(const Options& o) { return o.mode == kNetwork || (o.mode.empty() && o.clean_guides); }
 
 void check_options(const Options& o) {

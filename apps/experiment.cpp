@@ -53,7 +53,7 @@ std::string read_file(const std::string& path) {
   return text.str();
 }
 
-/// Version and commit; if the commit does not identify the build, a hash of the program's content.
+/// Version and commit; plus a hash of the program's content if the commit does not identify the build.
 std::string program_version() {
   std::string text = version_text();
   if (!text.ends_with(')') || text.ends_with("-dirty)")) text += " " + hash_text(hash_bytes(read_file(program_path())));
@@ -87,7 +87,7 @@ lab::Suite load_suite(const ExperimentCommand& command) {
   } else if (is_scene_file(command.suite)) {
     if (!fs::exists(given)) throw Error(ErrorCode::kIo, "cannot open '" + command.suite + "'");
     suite = builtin("compare");
-    // A scene called scene.xml is known by its folder.
+    // A scene called scene.xml is named after its folder.
     const fs::path file = fs::absolute(given);
     const bool common = file.stem().string().starts_with("scene");
     lab::SceneEntry scene;
@@ -146,7 +146,7 @@ void show_progress(const lab::Progress& p, ProgressLine& line) {
 // ---- the command
 // -----------------------------------------------------------------------------------------------------
 
-/// Options of a method as `covary render` reads them, of frames or not.
+/// A method's options parsed as by `covary render`, with or without frames.
 RenderOptions parsed(std::vector<std::string> words, bool of_frames) {
   CLI::App command;
   RenderOptions options;
@@ -175,7 +175,7 @@ bool is_results(const std::string& path) {
   return text.find(lab::kResultsFormat) != std::string::npos;
 }
 
-/// Before the experiment begins: its results must not overwrite anything that it reads, or other people's files.
+/// Before the experiment begins: results must not overwrite anything that it reads, or unrelated files.
 void check_files(const ExperimentCommand& command, const lab::Suite& suite, const std::string& scenes) {
   Outputs outputs;
   outputs.reads(command.suite);
@@ -198,8 +198,8 @@ void check_files(const ExperimentCommand& command, const lab::Suite& suite, cons
                       command.output, name));
 }
 
-/// Reads the options of each method as `covary render` will, so that nothing runs before all of them are valid. Other
-/// mistakes of the suite are left to run_experiment().
+/// Parses each method's options as `covary render` will, so that nothing runs unless all are valid. run_experiment()
+/// reports other mistakes of the suite.
 void check_methods(const lab::Suite& suite) {
   if (!lab::validate(suite).empty()) return;
   const bool of_frames = std::any_of(suite.scenes.begin(), suite.scenes.end(),

@@ -22,7 +22,7 @@ namespace {
 
 [[noreturn]] void usage(const std::string& message) { throw Error(ErrorCode::kUsage, message); }
 
-/// A factor that makes the motion match, from those by which conventions differ, if the given one does not.
+/// If the motion does not match, the signs of another convention with which it does; nullopt if there are none.
 std::optional<std::array<float, 2>> better_signs(const Image& before, const Image& now, const MotionLayers& motion,
                                                  double fit) {
   constexpr double kClearly = 0.95;
@@ -37,8 +37,8 @@ std::optional<std::array<float, 2>> better_signs(const Image& before, const Imag
   return best;
 }
 
-/// Motion that explains less of the changes than no motion, or than motion with another sign, is wrong. (Warping a
-/// noisy picture by fractions of pixels smooths it, so any motion may fit better than none.)
+/// Motion that explains less of the changes than no motion, or than motion with other signs, is wrong. (Warping a noisy
+/// image by fractions of pixels smooths it, so any motion may fit better than none.)
 void check_motion(const std::string& before, const std::string& now, const std::string& layer,
                   const MotionLayers& motion) {
   const auto picture = [&](const std::string& path) {
@@ -59,7 +59,7 @@ void check_motion(const std::string& before, const std::string& now, const std::
                           now, before, fit, instead));
 }
 
-/// Frames with the same seed share errors, which their samples cannot reveal.
+/// Frames with the same seed share errors, which held-out samples cannot reveal.
 void check_seeds(const std::string& before, const std::string& now) {
   const auto seed = [](const std::string& path) {
     const auto attributes = inspect_image(path).attributes;
@@ -84,7 +84,7 @@ MotionSource motion_source(const FrameOptions& o) {
   return source;
 }
 
-/// The pattern of the files with motion; if none has it, the first, whose channels the error then lists.
+/// The pattern of the files that contain motion; if none does, the first, whose channels the error then lists.
 std::string motion_pattern(const MotionSource& source, const FramePatterns& patterns, int frame) {
   std::vector<std::string> all = patterns.images;
   all.insert(all.end(), patterns.others.begin(), patterns.others.end());
@@ -122,7 +122,7 @@ std::string file_of_frame(const std::string& path, int frame) {
 }
 
 bool are_frames(const FrameOptions& o, const FramePatterns& patterns) {
-  motion_source(o);  // reports a wrong --motion-scale before any file is read
+  motion_source(o);  // reports an invalid --motion-scale before any file is read
   if (patterns.images.empty() || !is_frame_pattern_of_input(patterns.images[0])) {
     if (!o.frames.empty()) usage("--frames: the input has no '#' for the frame's number");
     return false;

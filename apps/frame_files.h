@@ -33,7 +33,7 @@ std::string file_of_frame(const std::string& path, int frame);
 /// Files of frames, by patterns.
 struct FramePatterns {
   std::vector<std::string> images;  ///< each with its own samples
-  std::vector<std::string> others;  ///< that may have motion, too, or may not be patterns
+  std::vector<std::string> others;  ///< that may contain motion, too, or may not be patterns
   std::string output;
   std::string layer;  ///< of the first image
 };
@@ -44,7 +44,7 @@ bool are_frames(const FrameOptions& options, const FramePatterns& patterns);
 
 /// Calls `run` with the number of each frame, and the history of the previous frame if that was run just before. The
 /// motion comes from the first file that has the layer. Throws Error(kInput) if the motion does not match the frames,
-/// or frames share a seed, because their samples could not reveal the shared errors.
+/// or if frames share a seed, because their samples could not reveal the shared errors.
 void for_each_frame(const FrameOptions& options, const FramePatterns& patterns, bool has_history,
                     const std::function<void(int frame, std::shared_ptr<const History> history)>& run);
 

@@ -11,7 +11,7 @@
 namespace covary {
 namespace {
 
-/// Last parts of layers' names, those first that see through mirrors and glass. Sources: docs/other-renderers.md.
+/// Last parts of layer names; layers that see through mirrors and glass come first. Sources: docs/other-renderers.md.
 constexpr std::array<std::string_view, 7> kAlbedo = {
     "DenoisingAlbedo",   // covary --aovs
     "Denoising Albedo",  // Blender
@@ -24,8 +24,8 @@ constexpr std::array<std::string_view, 7> kAlbedo = {
 constexpr std::array<std::string_view, 9> kNormal = {
     "DenoisingNormal",     // covary --aovs
     "Denoising Normal",    // Blender
-    "Ns",                  // pbrt-v4: of shading
-    "N",                   // covary, Arnold, pbrt-v4: of the geometry
+    "Ns",                  // shading normal
+    "N",                   // geometric normal
     "sh_normal",           // Mitsuba 3
     "normal",              // RenderMan
     "AVG_SHADING_NORMAL",  // LuxCore
@@ -66,7 +66,7 @@ Image named_guide(const std::string& path, const ImageInfo& info, const std::str
   const std::vector<std::string> layers = image_layers(info.channels);
   if (std::find(layers.begin(), layers.end(), layer_or_file) != layers.end()) return checked_guide(path, layer_or_file);
   if (std::filesystem::exists(layer_or_file)) return checked_guide(layer_or_file, "");
-  return checked_guide(path, layer_or_file);  // says which layers there are
+  return checked_guide(path, layer_or_file);  // the error lists the layers
 }
 
 }  // namespace covary

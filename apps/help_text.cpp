@@ -12,13 +12,13 @@ namespace {
 
 constexpr size_t kColumns = 100, kTextColumn = 27;
 
-/// Characters of UTF-8 text.
+/// Number of characters in UTF-8 text.
 size_t length(const std::string& text) {
   return static_cast<size_t>(
       std::count_if(text.begin(), text.end(), [](unsigned char c) { return (c & 0xC0u) != 0x80u; }));
 }
 
-/// `text` beside its term, in lines of kColumns columns; below it where the term is long.
+/// `text` next to its term, wrapped at kColumns columns; below it if the term is long.
 std::string entry(const std::string& term, const std::string& text) {
   std::string lines = "  " + term;
   size_t column = length(lines);
@@ -40,7 +40,7 @@ std::string entry(const std::string& term, const std::string& text) {
 std::string option_entry(const OptionDescription& option) {
   if (option.names.empty()) return entry(option.value, option.text);
   const std::string value = value_text(option);
-  // Long names of an option without a short one begin where those of the others do.
+  // Aligns long names of options without a short name with the others.
   const std::string indent = option.names[0].starts_with("--") ? "    " : "";
   return entry(fmt::format("{}{}{}{}", indent, fmt::join(option.names, ", "), value.empty() ? "" : " ", value),
                option.text);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// covary info: what an image or film holds, and whether it is unchanged, or what a scene file describes.
+// covary info: what an image or film contains, and whether it is intact, or what a scene file describes.
 #include <fmt/format.h>
 
 #include <map>
@@ -109,7 +109,7 @@ void info(const InfoOptions& options) {
   else
     print_text(info, options.path);
   std::fflush(stdout);
-  check_image(options.path);  // last: even a damaged file's claims may help
+  check_image(options.path);  // last: even the header of a damaged file may help
 }
 
 }  // namespace

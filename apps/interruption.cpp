@@ -12,7 +12,7 @@
 namespace covary {
 namespace {
 
-// Lock-free atomics, which a handler and threads may share.
+// Lock-free atomics may be shared by a signal handler and threads.
 std::atomic<bool> g_kept{false}, g_stop{false};
 std::atomic<int> g_signal{0};
 static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only place that handles Ctrl-C (SIGINT), requests to end (SIGTERM) and the end of the terminal (SIGHUP).
+// The only place that handles Ctrl-C (SIGINT), termination requests (SIGTERM) and the closing of the terminal (SIGHUP).
 #pragma once
 
 #include <atomic>
@@ -7,12 +7,12 @@
 
 namespace covary {
 
-/// For main(), once: from here on each of the signals ends the program at once, with exit code 128 + its number and no
-/// half-written file. Signals that the parent process had set to be ignored (nohup) stay ignored.
+/// Call once, in main(): from then on, each of the signals ends the program at once, with exit code 128 + its number
+/// and no partially written file. Signals that the parent process had ignored (nohup) stay ignored.
 void catch_signals();
 
-/// While this object lives, the first signal only sets a flag, for work with something to save; the second one ends the
-/// program at once. At most one object at a time.
+/// While this object lives, the first signal only sets a flag, for work that has something to save; the second ends the
+/// program at once. At most one object may exist at a time.
 class StopFlag {
  public:
   StopFlag();

@@ -30,8 +30,8 @@ namespace {
 
 std::string g_command_line;
 
-/// Opens closed standard streams: otherwise the next file would get their number, and messages would be written into
-/// it. Standard output then fails, as it should; error messages are lost.
+/// Opens closed standard streams: otherwise the next file would get their descriptors, and messages would be written
+/// into it. Standard output then fails, as it should; error messages are lost.
 void open_closed_streams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
     if (fcntl(stream, F_GETFD) == -1) [[maybe_unused]]
@@ -50,14 +50,14 @@ int report(const char* program, const Error& error) {
   return error.code() == ErrorCode::kUsage ? 2 : 1;
 }
 
-/// Long options of `command` that `given` may mean: misspelt or cut short. Compared without dashes, which would make
-/// all short names alike.
+/// Long options of `command` that `given` may mean, misspelt or abbreviated. Compared without dashes, which would make
+/// all short names similar.
 std::vector<std::string> near_options(const CLI::App& command, const std::string& given) {
   std::vector<std::string> names;
   for (const CLI::Option* option : command.get_options())
     names.insert(names.end(), option->get_lnames().begin(), option->get_lnames().end());
   const std::string bare = given.substr(std::min(given.find_first_not_of('-'), given.size()));
-  if (bare.size() < 2) return {};  // all short names resemble a letter
+  if (bare.size() < 2) return {};  // every short name is similar to a single letter
   std::vector<std::string> near = nearest_names(bare, names);
   if (near.empty())
     std::copy_if(names.begin(), names.end(), std::back_inserter(near), [&](auto& n) { return n.starts_with(bare); });
@@ -91,7 +91,7 @@ int run(int argc, char** argv) {
     check_standard_output();
     return 0;
   }
-  // CLI11 would call an unknown subcommand a stray argument; name it and the nearest one.
+  // CLI11 would report an unknown subcommand as an extra argument; name it and the nearest one.
   const std::string first = argv[1];
   if (!first.empty() && first[0] != '-') {
     std::vector<std::string> names;
@@ -161,7 +161,7 @@ int main(int argc, char** argv) {
   if (words.empty()) words.emplace_back();
   words[0] = "covary";
   covary::g_command_line = covary::shell_text(words);
-  // A file that exceeds its size limit is an error like a full disk, which leaves no half-written file behind.
+  // Makes exceeding the file size limit an error like a full disk, so that no partially written file remains.
   std::signal(SIGXFSZ, SIG_IGN);
   covary::catch_signals();
   const int code = covary::run_and_report(argc, argv);

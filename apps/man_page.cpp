@@ -7,7 +7,7 @@
 namespace covary {
 namespace {
 
-/// Text for man(7): escapes requests and escapes, and keeps "-" the character that shells know.
+/// Text for man(7): escapes requests and backslashes, and keeps "-" a plain hyphen-minus, as shells need.
 std::string escaped(const std::string& text) {
   std::string result;
   if (!text.empty() && (text[0] == '.' || text[0] == '\'')) result = "\\&";

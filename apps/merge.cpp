@@ -38,7 +38,7 @@ std::string attribute(const ImageInfo& info, const std::string& name) {
   return found == info.attributes.end() ? "" : found->second;
 }
 
-/// The files that a render made from films that it did not keep.
+/// Whether the file is the image of a render rather than a film.
 bool is_result(const ImageInfo& info) {
   return attribute(info, "film").empty() && !attribute(info, "estimator").empty();
 }
@@ -57,7 +57,7 @@ std::optional<fs::path> folder_of_films(const std::string& path, const ImageInfo
   return std::nullopt;
 }
 
-/// Commands that merge the films in these folders and make one image of them.
+/// Commands that merge the films in these folders and make one image of the result.
 std::vector<std::string> commands_of_films(const std::vector<fs::path>& folders, const std::string& output,
                                            const std::string& estimator) {
   std::vector<std::string> commands, combine{"covary", "combine"};

@@ -28,7 +28,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Samples per pixel of the request if only the training takes any.
+/// Samples per pixel of the request if only the training needs a number.
 constexpr uint32_t kAnyBudget = 1u << 20;
 
 struct ProbeOptions {
@@ -68,7 +68,7 @@ Image side_by_side(const Images& images) {
   return all;
 }
 
-/// For display: one percent of the values is above white. Radiance and density differ by orders of magnitude.
+/// For display: one percent of the values is clipped to white. Radiance and density differ by orders of magnitude.
 Image exposed(Image image) {
   std::vector<float> values = image.data;
   const auto white = values.begin() + static_cast<ptrdiff_t>(0.99 * static_cast<double>(values.size() - 1));

@@ -63,7 +63,7 @@ void ProgressLine::begin(const std::string& phase) {
 void ProgressLine::update(uint64_t done, uint64_t total) {
   if (quiet_) return;
   const std::unique_lock lock(mutex_, std::try_to_lock);
-  if (!lock) return;  // tiles do not wait for the terminal
+  if (!lock) return;  // tiles must not wait for the terminal
   if (done < first_) first_ = 0;
   done_ = done, total_ = total;
   if (of_line_.seconds() >= next_) draw();
@@ -102,7 +102,7 @@ std::string ProgressLine::bar_text(int columns) const {
     left = in_time;
   }
   fraction = std::clamp(fraction, 0.0, 1.0);
-  // Beside an error there is no room for the rate on 80 columns.
+  // With an error, 80 columns leave no room for the rate.
   const std::string speed = note_.empty() ? fmt::format("{} samples/s  ", format_count(rate)) : "";
   const std::string end = fmt::format(" {:3.0f} %  {}{} left{}", 100 * fraction, speed, format_duration(left), note_);
   const std::string start = fmt::format("{}: {} ", label_, phase_);

@@ -12,9 +12,9 @@
 
 namespace covary {
 
-/// A line on stderr that shows what a command does, its progress, rate and the time left. On a terminal the line is
-/// redrawn a few times a second, no wider than the terminal; otherwise a new line with a bar appears every ten seconds,
-/// so that logs stay short. All functions may be called from any thread.
+/// A line on stderr showing a command's progress, rate and remaining time. On a terminal it is redrawn a few times a
+/// second, no wider than the terminal; otherwise a new line with a bar is printed every ten seconds, so that logs stay
+/// short. All functions are thread-safe.
 class ProgressLine {
  public:
   ProgressLine(std::string label, bool quiet);
@@ -27,10 +27,10 @@ class ProgressLine {
   void begin(const std::string& phase);
   /// Samples of the phase. `total` == 0: unknown.
   void update(uint64_t done, uint64_t total);
-  /// A time limit, from now on, that ends the work if `total` is not reached first.
+  /// A time limit, from now on, that ends the work unless `total` is reached first.
   void limit(double seconds);
-  /// The error reached so far, shown with its bounds. With a `goal` > 0, the total is at least the number of samples
-  /// that it will take, because errors fall like 1 / samples.
+  /// The error so far, shown with its bounds. With a `goal` > 0, the total is at least the estimated number of samples
+  /// for it, as errors fall like 1 / samples.
   void toward(const PredictedError& reached, double goal);
   /// Shows this text instead.
   void show(const std::string& text);

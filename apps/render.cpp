@@ -181,7 +181,7 @@ Outputs files_of(const RenderOptions& options) {
 std::unique_ptr<Display> display_of(const RenderOptions& options) {
   if (options.display_server.empty()) return nullptr;
   return std::make_unique<Display>(options.display_server, options.request().output, [](const std::string& text) {
-    // On a terminal, over the progress line.
+    // On a terminal, overwrites the progress line.
     fmt::print(stderr, "{}warning: {}\n", isatty(2) == 1 ? "\r\033[K" : "", text);
   });
 }

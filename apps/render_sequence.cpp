@@ -63,7 +63,7 @@ RenderOptions frame_options(const RenderOptions& options, int frame) {
 }
 
 /// A hash of everything that the frame's image depends on: scene and camera, previous camera, seed and settings; with a
-/// history also `earlier`, the hash of the previous frame.
+/// history, also `earlier`, the hash of the previous frame.
 std::string frame_hash(const RenderOptions& one, const LoadedScene& scene, const Transform& before,
                        const std::string& earlier) {
   OptionValues values = one.values;
@@ -103,7 +103,7 @@ class FrameTimes {
   }
 
   double time(int frame) const { return frame / rate_; }
-  /// The camera's place by the path, or else by the scene's animation; nothing if neither moves it.
+  /// The camera's place on the path, or by the scene's animation; nullopt if neither moves it.
   std::optional<Transform> camera(const LoadedScene& scene, int frame) const {
     if (path_) return path_->at(time(frame));
     if (scene.camera_to_world) return scene.camera_to_world->at(time(frame));
@@ -120,7 +120,7 @@ class FrameTimes {
   double rate_ = 1;
 };
 
-/// The frame's layers; `before` is where its camera was at the time `then`.
+/// Traces the frame's motion layers; `before` is the previous camera transformation, at time `then`.
 void trace_motion(const Transform& before, double then, const LoadedScene& scene, RenderRequest& request) {
   CameraSettings settings = scene.camera->settings();
   settings.to_world = before;
@@ -175,7 +175,7 @@ class SequenceRender {
     ProgressLine progress(stem(), options.quiet);
     progress.begin("loading");
     const Stopwatch watch;
-    scene_.reset();  // two might not fit into memory
+    scene_.reset();  // two might not fit in memory
     scene_ = load(options);
     load_seconds_ = watch.seconds() - scene_->scene->build_seconds();
     own_camera_ = scene_->camera->settings().to_world;
@@ -190,7 +190,7 @@ class SequenceRender {
     if (stop.is_set()) throw Unfinished(stop.exit_code(), interruption(index));
     if (has_many_scenes()) load_scene(one, std::span(outputs_).subspan(index, 1));
     RenderRequest request = make_request(one, *scene_);
-    const bool follows = frame - 1 == last_frame_;  // nothing is known about frames that are farther apart
+    const bool follows = frame - 1 == last_frame_;  // the previous frame is unknown otherwise
     const Transform now = times_.camera(*scene_, frame).value_or(own_camera_);
     const Transform before = times_.camera(*scene_, frame - 1).value_or(follows ? last_camera_ : now);
     times_.place(frame, now, *scene_);

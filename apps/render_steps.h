@@ -28,10 +28,10 @@ struct RenderReport {
 /// The object of --json.
 nlohmann::ordered_json statistics(const RenderReport& report);
 
-/// Lines on stderr about samples that were not finite or negative, with the commands that replay them.
+/// Prints lines on stderr about samples that were negative or not finite, with the commands that replay them.
 void report_bad_samples(const RenderOptions& options, const Pass& pass);
 
-/// Lines on stderr about a finished render.
+/// Prints lines on stderr about a finished render.
 void print_summary(const RenderReport& report);
 
 // covary render --frames: a scene to numbered images. The scene is loaded and built once or, if it is a pattern of

@@ -15,9 +15,9 @@ void add_stages_option(CLI::App& command, std::string& folder);
 /// Throws Error(kUsage) if a folder is named and the estimator has no steps to show.
 void check_stages(const std::string& folder, const Estimator& estimator);
 
-/// Writes each stage as NAME.exr, and NAME.png to look at; does nothing if no folder is named. Creates the folder if
-/// needed. Images of one channel are coloured from black over red to pale yellow, in decades if they span more than
-/// two. Throws Error(kIo).
+/// Writes each stage as NAME.exr, and as NAME.png for viewing; does nothing if no folder is named. Creates the folder
+/// if needed. Images of one channel are coloured from black through red to pale yellow, on a logarithmic scale if they
+/// span more than two decades. Throws Error(kIo).
 void save_stages(const std::string& folder, const Estimator& estimator, const GroupedImage& crn,
                  const GroupedImage& independent, const PairSettings& settings, const ImagePlace& place);
 

@@ -14,7 +14,7 @@ namespace {
 
 using Words = std::vector<std::string>;
 
-// Stands for the files that an experiment adds to the command.
+// Placeholders for the files that an experiment adds to the command.
 constexpr const char *kInput = "the-input-of-the-experiment", *kOutput = "the-output-of-the-experiment";
 
 /// What a value with this placeholder names outside the suite; null for plain values.

@@ -42,12 +42,12 @@ VideoWriter::~VideoWriter() {
 
 void VideoWriter::start(int width, int height) {
   width_ = width, height_ = height;
-  // Codecs need even sizes: a black column or row is added. Half-resolution chroma (yuv420p) is what all players show.
+  // Codecs need even sizes: adds a black column or row. All players support half-resolution chroma (yuv420p).
   const std::string command =
       shell_text({"ffmpeg", "-loglevel", "error", "-f", "rawvideo", "-pixel_format", "rgb24", "-video_size",
                   fmt::format("{}x{}", width, height), "-framerate", fmt::format("{}", rate_), "-i", "-", "-vf",
                   "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-y", temporary_});
-  std::signal(SIGPIPE, SIG_IGN);  // an ffmpeg that ends early is an error of writing
+  std::signal(SIGPIPE, SIG_IGN);  // reported as a write error if ffmpeg ends early
   pipe_ = popen(command.c_str(), "w");
   if (!pipe_) throw Error(ErrorCode::kIo, "cannot start ffmpeg");
 }
@@ -59,7 +59,7 @@ void VideoWriter::add(const Image& frame) {
                                                frame.height, width_, height_));
   bytes_.resize(frame.data.size());
   std::transform(frame.data.begin(), frame.data.end(), bytes_.begin(), [](float linear) {
-    const float value = linear > 0 ? std::min(linear, 1.0f) : 0;  // and what is not a number
+    const float value = linear > 0 ? std::min(linear, 1.0f) : 0;  // NaN becomes 0, too
     return static_cast<unsigned char>(std::lround(255 * linear_to_srgb(value)));
   });
   if (std::fwrite(bytes_.data(), 1, bytes_.size(), pipe_) != bytes_.size()) finish();

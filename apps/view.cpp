@@ -61,7 +61,7 @@ struct Shown {
 
 constexpr double kPixels = 3 * sizeof(float);  // bytes per pixel
 
-/// The shortest distinct ends of the paths: "a/pt.exr" and "b/pt.exr", but "pt" if it is alone.
+/// The shortest distinct suffixes of the paths: "a/pt.exr" and "b/pt.exr", but "pt" if it is alone.
 void name_images(std::vector<Shown>& images) {
   for (Shown& image : images) image.name = fs::path(image.path).stem().string();
   for (Shown& image : images) {
@@ -72,7 +72,7 @@ void name_images(std::vector<Shown>& images) {
   }
 }
 
-/// The same of frames, whose names are those of the sequences: "pt" of "pt_####.exr".
+/// The same for frames, named after their sequences: "pt" of "pt_####.exr".
 void name_frames(const ViewOptions& options, int frame, std::vector<Shown>& images) {
   std::vector<std::string> patterns = options.images;
   if (!options.reference.empty()) patterns.push_back(options.reference);
@@ -92,7 +92,7 @@ std::vector<Shown> read_images(const ViewOptions& options) {
   const auto add = [&](const std::string& path, bool is_reference) {
     const auto same = [&](const Shown& image) { return image.path == path; };
     if (std::find_if(images.begin(), images.end(), same) != images.end()) return;
-    // Before reading: the page holds the image twice more, cropped and encoded.
+    // Checked before reading: the page holds two more copies of the image, cropped and encoded.
     const CropWindow window = inspect_image(path).place.window;
     require_image_memory(path, window.width, window.height, 3 * kPixels);
     images.push_back({path, "", read_image(path, options.layer), is_reference});
@@ -120,7 +120,7 @@ nlohmann::ordered_json parse_inset(const std::string& text, const CropWindow& wi
   return {{"x", v[0]}, {"y", v[1]}, {"w", v[2]}, {"h", v[3]}};
 }
 
-/// How the page displays a layer: directions and other vectors are not colours.
+/// How the page displays a layer: normals and other vectors are not colours.
 const char* display_of(const std::string& path, const std::vector<ExrFile::Channel>& channels,
                        const std::string& layer) {
   const std::vector<std::string> names = layer_channels(path, channels, layer);
@@ -174,7 +174,7 @@ void Page::add_errors(const Shown& image, const Image& pixels, nlohmann::ordered
     entry["label"] = "predicted relMSE " + predicted;
 }
 
-/// The other layers of the image's file, those of one channel as such.
+/// Adds the other layers of the image's file, keeping single channels as such.
 void Page::add_layers(const Shown& image, const std::string& shown, nlohmann::ordered_json& entry) {
   const ImageInfo info = inspect_image(image.path);
   std::vector<std::string> layers = offered_layers(info.channels, shown);
@@ -267,7 +267,7 @@ nlohmann::ordered_json add_scene(const ViewOptions& options, std::optional<int> 
   return {{"name", names_of(shown)}, {"images", entries}, {"insets", insets}};
 }
 
-/// Frames as scenes of the comparer, which plays them; all must fit in memory.
+/// Adds frames as scenes of the comparer, which plays them; all must fit in memory.
 nlohmann::ordered_json add_frames(const ViewOptions& options, Page& page) {
   const std::vector<int> frames = frames_of(options.frames, options.images[0]);
   page.small = true;
