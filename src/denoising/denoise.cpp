@@ -41,14 +41,15 @@ struct Api {
                     size_t byte_offset, size_t pixel_stride, size_t row_stride) = nullptr;
   void (*set_bool)(void* filter, const char* name, bool value) = nullptr;
   void (*set_int)(void* filter, const char* name, int value) = nullptr;
-  /// `question` is asked while the filter works, which ends early once it says false.
+  /// Calls `question` while the filter works; the filter stops early once it returns false.
   void (*set_progress)(void* filter, bool (*question)(void* data, double done), void* data) = nullptr;
   void (*commit_filter)(void* filter) = nullptr;
   void (*execute_filter)(void* filter) = nullptr;
   void (*release_filter)(void* filter) = nullptr;
 };
 
-/// Where Python's wheel `pyoidn` puts the library, from the root of an environment down; a star is any ending.
+/// Where the Python wheel `pyoidn` puts the library, from the root of an environment downwards; a star matches any
+/// suffix.
 constexpr std::array<const char*, 6> kWheelFolders = {"lib", "python3*", "*-packages", "pyoidn", "oidn", "lib"};
 
 bool matches(const std::string& name, std::string_view pattern) {
@@ -58,7 +59,7 @@ bool matches(const std::string& name, std::string_view pattern) {
   return name.size() >= before.size() + after.size() && name.starts_with(before) && name.ends_with(after);
 }
 
-/// The library in `folder` if it holds it, or else below it, along the wheel's folders from number `first` on.
+/// Finds the library in `folder` or, below it, along the wheel's folders from number `first` on.
 void find_along_wheel(const fs::path& folder, size_t first, std::vector<std::string>& found) {
   std::error_code ignored;
   if (first == kWheelFolders.size()) {
@@ -72,7 +73,8 @@ void find_along_wheel(const fs::path& folder, size_t first, std::vector<std::str
   for (const fs::path& next : below) find_along_wheel(next, first + 1, found);
 }
 
-/// What a user's path may mean: the library, its folder, any folder of the wheel above it up to the environment's root.
+/// What a user's path may denote: the library, its folder, or any folder of the wheel above it up to the environment's
+/// root.
 std::vector<std::string> libraries_at(const std::string& path) {
   std::vector<std::string> found;
   if (!fs::is_directory(path)) return {path};
@@ -86,7 +88,7 @@ std::string environment(const char* name) {
   return value ? value : "";
 }
 
-/// The folder of Python's packages that this code lies in where pip installed it, else "".
+/// The folder of Python packages that contains this code if pip installed it, otherwise "".
 fs::path own_packages() {
   Dl_info info{};
   if (!dladdr(reinterpret_cast<const void*>(&own_packages), &info) || !info.dli_fname) return {};
@@ -96,7 +98,7 @@ fs::path own_packages() {
   return folder.has_relative_path() ? folder : fs::path();
 }
 
-/// Where the library may be, in order. A name without a folder is left to the loader.
+/// Possible locations of the library, in order. A name without a folder is left to the loader.
 std::vector<std::string> candidates(const DenoiseOptions& options) {
   if (!options.library.empty()) return libraries_at(options.library);
   if (const std::string path = environment("COVARY_OIDN"); !path.empty()) return libraries_at(path);
@@ -204,7 +206,7 @@ struct Denoiser::Library {
     check();
     const auto threads = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
     api.set_device_int(device.get(), "numThreads", static_cast<int>(threads));
-    // Pinned threads of two processes on one machine get in each other's way.
+    // Pinned threads of two processes on one machine would compete for the same cores.
     api.set_device_int(device.get(), "setAffinity", 0);
     api.commit_device(device.get());
     check();
@@ -219,8 +221,8 @@ struct Denoiser::Library {
 
 namespace {
 
-/// One run of the filter "RT". It owns all that the library touches: the library cannot be stopped inside of a layer
-/// of the network (half a second and more on large images), so that its thread may outlive whoever asked for the image.
+/// One run of the filter "RT". It owns everything that the library accesses: the library cannot be stopped within a
+/// layer of the network (half a second or more on large images), so its thread may outlive the caller.
 struct Run {
   std::shared_ptr<const Denoiser::Library> library;
   std::deque<std::pair<const char*, Image>> inputs;  ///< by the filter's names; at least one
@@ -228,10 +230,10 @@ struct Run {
   Image result;
   std::atomic<bool> cancelled{false};
 
-  /// Throws Error(kIo) when the library refuses to work, or was cancelled.
+  /// Throws Error(kIo) if the library fails or was cancelled.
   void execute() {
     const Api& api = library->api;
-    // Errors of the library belong to the thread that asks for them.
+    // The library stores errors per thread.
     const std::unique_ptr<void, void (*)(void*)> filter(api.new_filter(library->device.get(), "RT"),
                                                         api.release_filter);
     library->check();
@@ -253,7 +255,7 @@ struct Run {
   }
 };
 
-/// The result; throws Stopped as soon as the work around it is to end.
+/// The result; throws Stopped as soon as the enclosing work is stopped.
 Image image_of(const std::shared_ptr<Run>& run) {
   run_detached([run] { run->execute(); }, [run] { run->cancelled = true; });
   return std::move(run->result);

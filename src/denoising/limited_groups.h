@@ -24,7 +24,7 @@ inline constexpr float kBrighter = 6;
 class LimitedGroups {
  public:
   LimitedGroups(const GroupedImage& image, const std::vector<unsigned char>& valid);
-  /// Valid as long as this object and the image's counts live.
+  /// Valid while this object and the image's counts exist.
   const GroupedImage& view() const { return view_; }
   LimitedGroups(const LimitedGroups&) = delete;
   LimitedGroups& operator=(const LimitedGroups&) = delete;

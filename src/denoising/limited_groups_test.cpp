@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fireflies are left out, light that both halves of the groups find is not.
+// Fireflies are limited; light that both halves of the groups find is not.
 #include "denoising/limited_groups.h"
 
 #include <gtest/gtest.h>

@@ -17,11 +17,11 @@ struct FrameRange {
 /// Parses "7", "1-48" or "1-48:2"; false if the text is none of these, or a number is above 999,999.
 bool read_frame_range(const std::string& text, FrameRange& range);
 
-/// Whether there is a run of '#' in the last part of the path.
+/// Whether the last component of the path contains a run of '#'.
 bool is_frame_pattern(const std::string& pattern);
 
-/// The same for a file to read, whose frames may also lie in folders: "passes_####/crn.exr". False if a file has
-/// exactly that name.
+/// The same for a file to read, whose frames may also be in separate folders: "passes_####/crn.exr". False if a file
+/// has exactly that name.
 bool is_frame_pattern_of_input(const std::string& pattern);
 
 /// The file of a frame: replaces the last run of '#'. Throws Error(kUsage) if there is none.
