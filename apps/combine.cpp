@@ -79,7 +79,7 @@ void check_explain(const CombineOptions& o, const Estimator& estimator, const Gr
                             o.explain->y, window.width, window.height, window.x, window.y));
 }
 
-/// The terms of one pixel: f and, for each control variate, its position, coefficients, CRN mean and independent mean.
+/// The parts of one pixel: f, and for each control variate its place, coefficients, CRN mean and independent mean.
 nlohmann::ordered_json explain(const CombineOptions& o, const CombineRequest& request) {
   const CropWindow& window = request.independent.origin.place.window;
   const int x = o.explain->x - window.x, y = o.explain->y - window.y;

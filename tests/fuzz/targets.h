@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Readers fed with arbitrary bytes. Each target returns whether the input was accepted; false: rejected with an Error
-// of the input's fault. Anything else (another exception, Error(kInternal), a sanitizer's report) is a finding.
+// Feeds arbitrary bytes to readers. Each target returns whether the input was accepted; false: rejected with an Error
+// that blames the input. Anything else (another exception, Error(kInternal), a sanitizer report) is a finding.
 #pragma once
 
 #include <cstddef>

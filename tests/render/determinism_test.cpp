@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The same scene, seed and settings give the same bits: for any number of threads, any crop, any interruption.
+// The same scene, seed and settings give the same bits for any number of threads, any crop and any interruption.
 #include <tbb/global_control.h>
 
 #include <numeric>

@@ -76,8 +76,8 @@ void expect_mean(const Film& film, int channel, double expected, double planted 
   EXPECT_FALSE(statistics::t_test(values, expected * (1 - planted)).accepted);
 }
 
-// Without scattering the wall is dimmed by the exponential of what lies before it; distances are drawn for one channel
-// and serve all.
+// Without scattering, the wall is attenuated exponentially by the medium in front of it; distances are sampled for one
+// channel and used for all.
 TEST(Media, AbsorptionIsExponential) {
   const Film film = render(load(box(medium("0.05, 0.2, 0.5", "0")) + kLitWall), 1024, 1);
   for (int c = 0; c < 3; ++c) {
@@ -110,7 +110,7 @@ TEST(Media, LightSamplesSeeThroughBoundaries) {
   expect_mean(render(load(box(grid_medium({0.05f, 0.15f}, "0")) + body, 2), 256, 5), 0, unhidden * std::exp(-2 * 0.4));
 }
 
-// Under a sky of 1 everywhere, what scatters everything and absorbs nothing cannot be seen.
+// Under a uniform sky of radiance 1, a medium that scatters without absorption is invisible.
 TEST(Media, WhatScattersEverythingIsInvisible) {
   const std::string forwards = "<phase type='hg'><float name='g' value='0.7'/></phase>";
   for (const std::string& inside :

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Path tracers with a planted bug, for tests that must see it.
+// Path tracers with a planted bug, for tests that must detect it.
 #pragma once
 
 #include "integrators/path_tracer.h"

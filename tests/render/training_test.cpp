@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Integrators that learn: the same bits for any number of threads, a description that tells one training from another,
-// and passes that refuse what would mix them. By a small integrator whose sums depend on the order in which they are
-// added.
+// Integrators that learn: identical bits for any number of threads, a description that distinguishes trainings, and
+// passes that reject mixtures of them. Uses a small integrator whose sums depend on the order of addition.
 #include "passes/training.h"
 
 #include <tbb/global_control.h>

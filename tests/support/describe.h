@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plugins made in tests without a scene file: from a list of parameters, with everything recorded that goes wrong.
+// Creates plugins in tests without a scene file, from a list of parameters, and records all errors.
 #pragma once
 
 #include <filesystem>
@@ -42,7 +42,7 @@ class GivenObjects final : public ObjectFactory {
   std::vector<std::pair<ObjectPtr, std::shared_ptr<const SceneObject>>> objects_;
 };
 
-/// What came of making a plugin: the object, or all the errors, one a line.
+/// Result of creating a plugin: the object, or all errors, one per line.
 template <typename T>
 struct Made {
   std::shared_ptr<T> object;

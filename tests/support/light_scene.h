@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A scene of one shape that emits, and checks every emitter must pass.
+// A scene with a single emissive shape, and checks that every emitter must pass.
 #pragma once
 
 #include <gtest/gtest.h>

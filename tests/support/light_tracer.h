@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A small integrator that traces light, for tests of everything around such ones. Weights do not depend on the path:
-// camera samples are `path`'s times 1 - share, light paths are joined to the lens at each vertex and weighted by
-// `share`. So the image is that of `path` where light paths find everything: pinholes, no mirrors in view, area and
+// A small integrator that traces light, for tests of the code around light tracing. Weights do not depend on the path:
+// camera samples are those of `path` times 1 - share; light paths are connected to the lens at each vertex and weighted
+// by `share`. So the image equals that of `path` if light paths find everything: pinholes, no mirrors in view, area and
 // point lights. Slow and simple, one path at a time.
 #pragma once
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes of two files compared without statistics: rays of the camera, what they meet, its reflection and light.
+// Compares two scenes without statistics: camera rays, hits, reflection and light.
 #pragma once
 
 #include <gtest/gtest.h>
