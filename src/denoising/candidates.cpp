@@ -14,21 +14,21 @@
 namespace covary {
 namespace {
 
-/// What differences of guides are divided by, and the least albedo to divide by.
+/// Scales of guide differences, and the smallest albedo to divide by.
 constexpr float kAlbedoUnit = 0.07f, kNormalUnit = 0.2f, kLeastAlbedo = 0.02f;
 /// Bandwidths of the sharp and the smooth filter.
 constexpr float kSharp = 0.5f, kSmooth = 1;
-/// What a denoiser took away, given back to pixels more or less alike.
+/// Residual correction in two widths (residual_correction.h).
 constexpr ResidualOptions kWideResidual = {0.5f, 61, 4}, kNarrowResidual = {0.3f, 41, 2};
 
-/// Appends an image's channels, over `unit`, to planes from number `first` on.
+/// Copies an image's channels, divided by `unit`, to the planes from index `first` on.
 void copy_guide(const Image& image, float unit, int first, Planes& planes) {
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x)
       for (int c = 0; c < 3; ++c) planes.row(first + c, y)[x] = image.pixel(x, y)[c] / unit;
 }
 
-/// operation(a, b) of every value.
+/// operation(a, b) for each pair of values.
 template <typename Operation>
 Image combined(const Image& a, const Image& b, const Operation& operation) {
   Image result = a;
@@ -73,7 +73,8 @@ FilterGuides filter_guides(const Guides& guides, FilterKinds kinds) {
 const Planes* or_null(const Planes& planes) { return planes.count() > 0 ? &planes : nullptr; }
 const Image* or_null(const Image& image) { return image.data.empty() ? nullptr : &image; }
 
-/// The regression of sources, beside their images by another filter. Of halves it is coarse: they only tell weights.
+/// The sources filtered by regression; `others`: their images by another filter. Coarse for halves, which serve only to
+/// find weights.
 std::vector<Image> regressed(const FilterGuides& guides, const CandidateInput& in, std::vector<const Image*> sources,
                              std::span<const Image> others, bool is_half) {
   RegressionInput input{in.estimate, in.std_error, std::move(sources), {}, or_null(guides.position), is_half};
@@ -83,7 +84,7 @@ std::vector<Image> regressed(const FilterGuides& guides, const CandidateInput& i
   return regressed(input, features, *in.valid);
 }
 
-/// Candidates of each of the inputs.
+/// The candidates of each input.
 std::vector<std::vector<Image>> filtered(const FilterGuides& guides, CandidateBase base,
                                          std::span<const CandidateInput> inputs) {
   std::vector<std::vector<Image>> all(inputs.size());
@@ -116,7 +117,7 @@ std::vector<std::vector<Image>> filtered(const FilterGuides& guides, CandidateBa
   return all;
 }
 
-/// The means of layers with the weights of each of the candidates.
+/// Filters layers with the weights of each candidate.
 std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, const CandidateInput& in,
                                                 std::span<const Image> layers) {
   const auto n = static_cast<ptrdiff_t>(layers.size());
@@ -147,7 +148,7 @@ std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, cons
   return all;
 }
 
-/// Open Image Denoise with guides that it has denoised, unless they are clean.
+/// Open Image Denoise with guides that it prefilters unless they are clean.
 class GuidedNetwork {
  public:
   GuidedNetwork(const Guides& guides, const DenoiseOptions& options) : denoiser_(options) {
@@ -162,7 +163,7 @@ class GuidedNetwork {
   }
 
   int runs() const { return denoiser_.runs(); }
-  /// The image is mirrored already.
+  /// `image` is already mirrored.
   Image denoise(const Image& image, Mirror mirror = Mirror::kNone) {
     if (mirror == Mirror::kNone) return denoiser_.denoise(image, or_null(albedo_), or_null(normal_), true);
     const Image albedo = mirrored(albedo_, mirror), normal = mirrored(normal_, mirror);
@@ -176,8 +177,8 @@ class GuidedNetwork {
   Image albedo_, normal_;
 };
 
-/// The network's images of the independent ones: it was trained on noise that differs from pixel to pixel.
-/// `with_residual`: and the same with what was taken away given back to pixels alike.
+/// The independent images denoised: the network was trained on noise that is independent between pixels.
+/// `with_residual`: the estimates instead, also with residual correction in two widths.
 std::vector<std::vector<Image>> denoised(GuidedNetwork& network, std::span<const CandidateInput> inputs,
                                          bool with_residual) {
   std::vector<const Image*> noisy;

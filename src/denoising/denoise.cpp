@@ -41,7 +41,7 @@ struct Api {
                     size_t byte_offset, size_t pixel_stride, size_t row_stride) = nullptr;
   void (*set_bool)(void* filter, const char* name, bool value) = nullptr;
   void (*set_int)(void* filter, const char* name, int value) = nullptr;
-  /// Calls `question` while the filter works; the filter stops early once it returns false.
+  /// Calls `question` while the filter runs; the filter stops once it returns false.
   void (*set_progress)(void* filter, bool (*question)(void* data, double done), void* data) = nullptr;
   void (*commit_filter)(void* filter) = nullptr;
   void (*execute_filter)(void* filter) = nullptr;
@@ -73,8 +73,8 @@ void find_along_wheel(const fs::path& folder, size_t first, std::vector<std::str
   for (const fs::path& next : below) find_along_wheel(next, first + 1, found);
 }
 
-/// What a user's path may denote: the library, its folder, or any folder of the wheel above it up to the environment's
-/// root.
+/// The libraries that a user's path may mean: the path may be a library, its folder, or any folder of the wheel above
+/// it, up to the environment's root.
 std::vector<std::string> libraries_at(const std::string& path) {
   std::vector<std::string> found;
   if (!fs::is_directory(path)) return {path};
@@ -88,7 +88,7 @@ std::string environment(const char* name) {
   return value ? value : "";
 }
 
-/// The folder of Python packages that contains this code if pip installed it, otherwise "".
+/// The site-packages folder that contains this code if pip installed it, otherwise "".
 fs::path own_packages() {
   Dl_info info{};
   if (!dladdr(reinterpret_cast<const void*>(&own_packages), &info) || !info.dli_fname) return {};
@@ -98,7 +98,7 @@ fs::path own_packages() {
   return folder.has_relative_path() ? folder : fs::path();
 }
 
-/// Possible locations of the library, in order. A name without a folder is left to the loader.
+/// Possible locations of the library, in order. The loader searches for a name without a folder.
 std::vector<std::string> candidates(const DenoiseOptions& options) {
   if (!options.library.empty()) return libraries_at(options.library);
   if (const std::string path = environment("COVARY_OIDN"); !path.empty()) return libraries_at(path);
@@ -118,7 +118,7 @@ struct LibraryFile {
   void* handle = nullptr;
 };
 
-/// The library stays loaded until the program ends: its threads and ours may share a scheduler.
+/// The library stays loaded until the program ends, because its threads and ours may share a scheduler.
 LibraryFile open_library(const DenoiseOptions& options, std::string& why) {
   for (const std::string& path : candidates(options)) {
     if (void* handle = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL)) return {path, handle};
@@ -221,11 +221,11 @@ struct Denoiser::Library {
 
 namespace {
 
-/// One run of the filter "RT". It owns everything that the library accesses: the library cannot be stopped within a
-/// layer of the network (half a second or more on large images), so its thread may outlive the caller.
+/// One run of the filter "RT". It owns everything that the library accesses, because its thread may outlive the caller:
+/// the library cannot be stopped within a layer of the network (half a second or more on large images).
 struct Run {
   std::shared_ptr<const Denoiser::Library> library;
-  std::deque<std::pair<const char*, Image>> inputs;  ///< by the filter's names; at least one
+  std::deque<std::pair<const char*, Image>> inputs;  ///< by the filter's names for them; at least one
   bool hdr = false, clean_guides = false, small_network = false;
   Image result;
   std::atomic<bool> cancelled{false};

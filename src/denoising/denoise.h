@@ -14,18 +14,18 @@ namespace covary {
 
 struct DenoiseOptions {
   /// The library's file, its folder, or a folder above it in the Python wheel `pyoidn`, up to the root of the
-  /// environment that holds the wheel. "": searches the environment variable COVARY_OIDN (likewise), beside covary if
-  /// pip installed both, the loader's path, and the wheel's usual places ($VIRTUAL_ENV, $CONDA_PREFIX, the user, the
-  /// system).
+  /// environment that holds the wheel. "": tries the path in the environment variable COVARY_OIDN, then beside covary
+  /// if pip installed both, the loader's path, and the wheel's usual places ($VIRTUAL_ENV, $CONDA_PREFIX, the user's
+  /// and the system's packages).
   std::string library;
 };
 
-/// The library and its device, loaded once for any number of images. The same input gives the same bits on one machine,
-/// also with other numbers of threads where this was measured (docs/methods/denoising.md).
+/// The library and its device, loaded once for any number of images. On one machine, the same input gives the same
+/// bits, and did so for every number of threads tried (docs/methods/denoising.md).
 class Denoiser {
  public:
   struct Library;
-  /// Throws Error(kUsage) if the library is missing, saying how to get it, and Error(kIo) if it fails.
+  /// Throws Error(kUsage), with how to get the library, if it is missing, and Error(kIo) if it fails.
   explicit Denoiser(const DenoiseOptions& options = {});
   ~Denoiser();
   Denoiser(const Denoiser&) = delete;
@@ -33,11 +33,11 @@ class Denoiser {
 
   /// Denoises `rgb` (linear, 3 channels, high dynamic range) on the CPU. `albedo` in [0, 1] and `normal` in [-1, 1] are
   /// guides that preserve texture and edges: 3 channels, the same size, or null; the normal only together with the
-  /// albedo. They may be noisy unless `clean_guides` is set. Values that are not finite are set to zero first. Throws
+  /// albedo. They may be noisy unless `clean_guides` is set. Non-finite values are set to zero first. Throws
   /// Error(kInput) if sizes differ, and Error(kIo) if the library fails. Inside run_stoppable() it returns at once when
   /// stopped; the library's own work ends in the background at its next step (core/detached_work.h).
   Image denoise(const Image& rgb, const Image* albedo, const Image* normal, bool clean_guides = false);
-  /// Denoises a guide alone, for `clean_guides`. `name`: "albedo" or "normal".
+  /// Prefilters a guide for use with `clean_guides`. `name`: "albedo" or "normal".
   Image denoise_guide(const std::string& name, const Image& guide);
   /// Number of images and guides denoised so far.
   int runs() const { return runs_; }
@@ -47,8 +47,8 @@ class Denoiser {
   int runs_ = 0;
 };
 
-/// Throws Error(kInput) if a guide has a value that is not finite, which would spread over the image. `name` is used in
-/// the message.
+/// Throws Error(kInput) if a guide has a non-finite value, which would spread over the image. `name` is for the
+/// message.
 void check_guide(const std::string& name, const Image& guide);
 
 /// A single call of Denoiser::denoise().
@@ -59,7 +59,7 @@ struct DenoiserInfo {
   std::string path;     ///< of the library
   std::string version;  ///< "2.5.1"
 };
-/// Loads the denoiser to find out. Throws like Denoiser().
+/// Loads the denoiser. Throws like Denoiser().
 DenoiserInfo denoiser_info(const DenoiseOptions& options = {});
 
 /// Path of the library that denoise() would load; "" if there is none.

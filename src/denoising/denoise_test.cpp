@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The denoiser where its library is installed; where it is not, the message that says how to get it. The checks of the
-// arguments need no library.
+// The denoiser if its library is installed, otherwise the message that says how to get it. The checks of arguments need
+// no library.
 #include "denoising/denoise.h"
 
 #include <gtest/gtest.h>
@@ -59,8 +59,7 @@ TEST(Denoise, LowersNoiseOrSaysHowToGetTheLibrary) {
   for (float value : denoise(image, nullptr, nullptr).data) ASSERT_TRUE(std::isfinite(value));
 }
 
-/// Every folder of the wheel leads to the library. It is a file without content here, which the loader refuses by its
-/// name.
+/// Every folder of the wheel leads to the library, here an empty file, which the loader rejects with its name.
 TEST(Denoise, FindsTheWheelFromEveryFolderOfIt) {
   fs::path folder = test_folder() / "venv";
   std::vector<std::string> above = {folder.string()};
@@ -77,7 +76,7 @@ TEST(Denoise, FindsTheWheelFromEveryFolderOfIt) {
     EXPECT_NE(message.find("Open Image Denoise was not found (" + library), std::string::npos) << path << "\n"
                                                                                                << message;
   }
-  // A folder that leads nowhere is named itself.
+  // The message names a folder that leads nowhere.
   const std::string elsewhere = (test_folder() / "venv" / "lib" / "python3.11" / "site-packages" / "other").string();
   fs::create_directories(elsewhere);
   const std::string message = message_of([&] { denoise(Image(4, 3, 3), nullptr, nullptr, {elsewhere}); });

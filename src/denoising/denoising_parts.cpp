@@ -14,11 +14,11 @@
 namespace covary {
 namespace {
 
-/// What the pixels around count, in groups, and the side of their window.
+/// Weight of the surrounding pixels' variance, in groups, and the side of their window.
 constexpr float kPriorFreedom = 8;
 constexpr int kVarianceWindow = 5;
 
-/// Pixels that the estimator leaves out may hold anything.
+/// Sets non-finite values to 0: pixels that the estimator leaves out may hold anything.
 void make_finite(Image& image) {
   for (float& value : image.data)
     if (!std::isfinite(value)) value = 0;
@@ -35,8 +35,8 @@ DenoisingPart part_of_pair(const Estimator& base, const GroupedImage& crn, const
   return part;
 }
 
-/// `scale` times the variance, of which `freedom` groups more than one tell, drawn to that around: the mean with an
-/// exponent of 3/4, so that the noise of a bright light is not that of the dark pixels beside it.
+/// Root of `scale` times the variance, which has `freedom` degrees of freedom, shrunk towards that of the surrounding
+/// pixels: their power mean with an exponent of 3/4, so that a bright light's noise hardly leaks into dark neighbours.
 Image std_error_of(const Planes& variance, const std::vector<unsigned char>& valid, int freedom, float scale) {
   Image result(variance.width(), variance.height(), 3);
   std::array<Planes, 3> around;
@@ -126,7 +126,7 @@ DenoisingParts parts_of_mean(const GroupedImage& independent) {
     DenoisingPart& part = parts.halves[half];
     part = part_of_mean(image.view(), parts.valid);
     if (groups > 1) continue;
-    // One group has no variance of its own. What is compared with the pixel itself may not know the other half's.
+    // A single group has no variance. The window's mean gives it: the pixel's own would depend on the other half.
     const float more = static_cast<float>(independent.groups) / static_cast<float>(groups);
     const Planes& all = parts.whole.independent.variance_of_mean;
     part.image.std_error = std_error_of(all, parts.valid, 0, more);

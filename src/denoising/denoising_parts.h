@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The inputs of a mixture of denoised images (mixed_denoising.h): the image of all samples and those of both halves,
-// made by the same method, and the independent images that judge them.
+// The inputs of a mixture of denoised images (mixed_denoising.h): images of all samples and of both halves, made by the
+// same method, and the held-out independent images that they are compared with.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@ struct MeanImage {
 
 /// The image of a set of samples.
 struct DenoisingPart {
-  EstimatorResult image;  ///< with its standard error; all values are finite
+  EstimatorResult image;  ///< with standard error; all values are finite
   Moments independent;    ///< mean of the independent samples of the set
   /// The mean without fireflies (limited_groups.h); empty for a pair.
   std::optional<MeanImage> limited;
@@ -35,22 +35,22 @@ struct DenoisingParts {
   bool is_mean = false;
   std::string name = "mean";  ///< of the image
   GroupedImage groups;        ///< the independent samples; the caller owns the memory
-  Guides guides;              ///< tell the pixels seen in mirrors and through glass; the caller owns the memory
+  Guides guides;              ///< identify pixels that see mirrors or glass; the caller owns the memory
 };
 
-/// Means of all pixels.
+/// The mean of each pixel, 3 channels.
 Image mean_image(const Moments& moments);
 
 /// For a base estimator of two passes.
 DenoisingParts parts_of_pair(const Estimator& base, const GroupedImage& crn, const GroupedImage& independent,
                              const PairSettings& settings);
 
-/// For independent samples alone: means of their groups, at least two. The variance between the groups of a pixel is
-/// shrunk towards the mean of the surrounding pixels, which counts as two more groups, because few groups determine a
-/// variance poorly. Halves of a single group have the variance of all groups, from the surrounding pixels alone.
-/// Fireflies are judged within each part, so that halves stay independent.
+/// For independent samples alone: means of at least two groups. A few groups determine a variance poorly, so the
+/// variance between the groups of a pixel is shrunk towards that of the surrounding pixels, which counts as eight more
+/// groups. A half of a single group takes its variance from all groups, of the surrounding pixels alone. Fireflies are
+/// limited within each part, so that halves stay independent.
 DenoisingParts parts_of_mean(const GroupedImage& independent);
-/// The same without halves, for any number of groups. A single group has a standard error of 0.
+/// The same without halves, for any number of groups. The standard error of a single group is 0.
 DenoisingParts whole_of_mean(const GroupedImage& independent);
 
 }  // namespace covary

@@ -15,18 +15,18 @@ namespace {
 
 constexpr float kInterval = 3;        // k, in standard errors
 constexpr int kErrorWindow = 5;       // side, pixels
-constexpr float kLeastScale = 0.02f;  // of colours
-/// Of a colour, that features may change it by.
+constexpr float kLeastScale = 0.02f;  // added to colours that divide standard errors
+/// The most by which features may change a history, relative to its colour.
 constexpr float kMostOfColour = 0.2f;
-/// How much the weights of the whole image count (MixtureInput::prior).
+/// MixtureInput::prior
 constexpr float kPrior = 2;
-/// MixtureInput::bias_share. Halves have twice the variance of the frame and the same history, so that history counts
-/// right for the whole where its error, which for the halves is all bias, counts twice. But windows of few samples
-/// overrate it (docs/notes/sequences.md).
+/// MixtureInput::bias_share. Halves have twice the variance of the frame but the same history, whose error is all bias
+/// to them: 2 would be right for the whole frame. But windows of few samples overrate that error
+/// (docs/notes/sequences.md).
 constexpr float kShare = 1.4f;
 
-/// How far what was moved by parts of a pixel is to be trusted, beside a frame's image with an error `scale` times as
-/// large as that of the whole.
+/// 1 / (1 + e / s'^2): trust in resampled history beside an image of the frame whose standard error is `scale` times
+/// that of the whole; 0 without history.
 float trust_at(const History& history, const Image& std_error, float scale, int x, int y) {
   if (!history.known[static_cast<size_t>(y) * history.image.width + x]) return 0;
   const float* s = std_error.pixel(x, y);
@@ -34,9 +34,9 @@ float trust_at(const History& history, const Image& std_error, float scale, int 
   return variance > 0 ? variance / (variance + *history.squared_error.pixel(x, y)) : 0;
 }
 
-/// Medians of relative standard errors over windows, times the picture. The error of a pixel alone is small where its
-/// samples happen to be dark and large where they are bright, so that history, limited by it, would darken frames: by
-/// 1.2 % of a still room with 8 samples. Means would let what glints widen the intervals of all around it, and absolute
+/// s*: medians of relative standard errors over windows, times the picture. The error of a single pixel is small where
+/// its samples happen to be dark and large where they are bright, so that clamping to it would darken frames: by 1.2 %
+/// in a still room with 8 samples. Means would let a glint widen the intervals of all pixels around it, and absolute
 /// errors those of dark pixels among bright ones, where a reflection has moved on.
 Image steady(const Image& std_error, const Image& picture) {
   const auto scale = [&](int x, int y, int c) { return std::abs(picture.pixel(x, y)[c]) + kLeastScale; };
@@ -58,7 +58,7 @@ Image steady(const Image& std_error, const Image& picture) {
   return result;
 }
 
-/// C of a frame's image or of that of a half, whose error is `scale` times as large. `limits`: steady().
+/// C of a frame's image, or of a half's, whose error is `scale` times as large. `limits`: from steady().
 Image candidate(const Image& frame, const History& history, const Image& std_error, const Image& limits, float scale) {
   Image result = frame;
   parallel_for(frame.height, 8, [&](int y) {
@@ -75,7 +75,7 @@ Image candidate(const Image& frame, const History& history, const Image& std_err
   return result;
 }
 
-/// D of a frame's image or of that of a half, within the interval of the frame; arguments as of candidate().
+/// D of the whole or of a half, clamped to the interval of the frame; other arguments as for candidate().
 Image limited(const Image& frame, const Image& accumulated, const Image& std_error, const Image& limits, float scale) {
   Image result = frame;
   for (size_t i = 0; i < frame.data.size(); ++i) {
@@ -85,18 +85,18 @@ Image limited(const Image& frame, const Image& accumulated, const Image& std_err
   return result;
 }
 
-/// Most of R that R' is made of, so that new samples always count.
+/// The largest weight of R in R', so that new samples always count.
 constexpr float kMostOfSamples = 0.9f;
 
-/// Least and most that history is multiplied by.
+/// Range of the factors that scale history.
 constexpr float kLeastFactor = 0.1f, kMostFactor = 10;
 
-/// What two pictures of the history are to be multiplied by, so that their light follows the frame's, per channel:
+/// Factors per channel that make two images of the history follow the frame's light:
 ///
-///     f = 1 + max(0, 1 - v / d^2) d / r,
+///     f = 1 + max(0, 1 - v / d^2) d / r.
 ///
-/// over pixels that look alike, d: sum of what the frame's own samples differ by from them, of the variance v, which
-/// halves tell; r: their own sum. The shrinkage is that of James and Stein: where d is noise alone, f is near 1.
+/// Over pixels that look alike, d sums the frame's samples minus history, with variance v, which follows from the
+/// halves, and r sums history. The shrinkage is James and Stein's [JamesStein1961]: where d is only noise, f is near 1.
 Image light_factors(const History& history, const HistoryInput& input, const std::array<const Image*, 2>& before) {
   const Image& counts = *input.common_counts;
   std::vector<unsigned char> valid = *input.valid;
@@ -132,7 +132,7 @@ void multiply(const Image& factors, Image& image) {
   for (size_t i = 0; i < image.data.size(); ++i) image.data[i] *= factors.data[i];
 }
 
-/// Y with the most of R.
+/// R' with b = 1. `trust`: trust_at() of each pixel.
 Image with_samples(const Image& own, const Image& before, const Image& trust) {
   Image result = own;
   parallel_for(result.data.size(), 4096, [&](size_t i) {

@@ -1,31 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
-// What frames before show of the same scene, mixed into a frame where held-out samples find that better (ours).
+// Temporal accumulation: mixes previous frames into a frame where held-out samples show less error for it (ours).
 //
-// M: the mixture of the frame alone, with the standard error s; s*: M times the median of s / M of 5 x 5 pixels; H: the
-// history, moved to where it is seen now, of samples that are independent of the frame's. The candidate is
+// M: the frame's own mixture, with standard error s; s*: M times the median of s / M in 5 x 5 pixels; H: the history,
+// previous frames reprojected to this one, whose samples are independent of the frame's. The candidate is
 //
-//     C = M + clamp(H - M, -k s*, k s*) / (1 + e / s'^2),     e: squared error of H for being moved by parts of pixels,
+//     C = M + clamp(H - M, -k s*, k s*) / (1 + e / s'^2),     e: squared error of H from resampling between pixels,
 //                                                             s'^2: mean of s^2 over the channels,
 //
-// so that history never leaves the interval in which the frame itself may be: what has changed (moving shadows, lamps
-// that are dimmed) leaves no trail, and edges are not blurred by being moved time and again. With halves M_A and M_B in
-// the place of M the same is made of each half, and mix() of mixture.h weights it as it does denoised images.
+// which stays within the confidence interval of the frame: changes (moving shadows, dimmed lamps) leave no trail, and
+// repeated resampling does not blur edges. Halves M_A and M_B in place of M give the candidate of each half, and mix()
+// of mixture.h weights it like a denoised image.
 //
-// Before, H and R are multiplied by what the frame's samples find that light has changed by, over pixels that look
+// First, H and R (below) are scaled by the change of the light that the frame's samples find, over pixels that look
 // alike: 1 + max(0, 1 - v / d^2) d / r with the difference d of sums, its variance v, and the sum r of the history
 // [JamesStein1961].
 //
-// Clamping to the values of the frame is usual in temporal antialiasing [Karis2014]; to a confidence interval and with
-// measured weights is ours. That the image before is a control variate for re-rendering is in [Rousselle2016].
+// Clamping to the frame's values is usual in temporal antialiasing [Karis2014]; clamping to a confidence interval and
+// measured weights are ours. [Rousselle2016] uses the previous image as a control variate for re-rendering.
 //
-// Where the samples of frames before are kept, they are denoised once more. With means of both halves of them, R_A and
-// R_B, and of the frame's own, Y_A and Y_B,
+// If samples of previous frames are kept, they are denoised again with the new ones. With R_A and R_B, the means of
+// their halves, and Y_A and Y_B, those of the frame's own,
 //
-//     R'_h = Y_h + b t (R_h - Y_h),   t = 0.9 / (1 + e / s'^2),     b by mix(): Y_B judges R_A, and Y_A judges R_B.
+//     R'_h = Y_h + b t (R_h - Y_h),   t = 0.9 / (1 + e / s'^2),     b by mix(): Y_B tests R_A, and Y_A tests R_B.
 //
 // So b follows from the variances of both and from what has changed, and R'_A and R'_B are independent of each other.
-// The frame's denoiser makes a mixture D of them as it does of its own samples. D is a second candidate beside C, in
-// M +- k max(s, s*), so that a firefly of one frame does not stay in the next ones; the frame's own samples judge both.
+// The frame's denoiser makes a mixture D of them, as of its own samples. D is a second candidate beside C, clamped to
+// M +- k max(s, s*), so that a firefly does not persist in later frames; the frame's own samples weight both.
 #pragma once
 
 #include <array>
@@ -35,21 +35,22 @@
 
 namespace covary {
 
-/// A picture of the frames before, by the pixels of this one.
+/// The previous frames, reprojected to the pixels of this one.
 struct History {
   Image image;                       ///< 3 channels
   Image squared_error;               ///< 1 channel: e
-  std::vector<unsigned char> known;  ///< 0: nothing is known there
-  std::array<Image, 2> samples;      ///< R_A and R_B, 3 channels; empty where they were not kept
-  /// Albedo and normal as the frame before had them there, and what the picture changes by with them: of feature i and
-  /// channel c at 3 i + c. Empty where they were not kept.
+  std::vector<unsigned char> known;  ///< 0: the pixel has no history
+  std::array<Image, 2> samples;      ///< R_A and R_B, 3 channels; empty if not kept
+  /// Albedo and normal of the previous frame, reprojected, 6 channels; and the slopes of its image over them, 18
+  /// channels: that of image channel c over feature i is at 3 i + c. Empty if not kept.
   Image features, slopes;
 };
 
-/// Adds to a history what this frame's features differ by from those that were moved, times the slopes: at edges and in
-/// textures, pixels show other parts of the same surfaces than before, and features tell which. At most a fifth of the
-/// colour, because slopes of blurred pictures of very bright light are too large; squared_error grows by the square of
-/// the whole difference. Nothing without features. Both have 3 channels. Throws Error(kInput) where sizes differ.
+/// Adds slopes times the difference of this frame's features from the reprojected ones to a history: at edges and in
+/// textures, pixels show other parts of the same surfaces than before, and features tell which. The change is clamped
+/// to a fifth of the colour, because slopes near blurred, very bright light are too large; squared_error grows by the
+/// square of the unclamped change. Does nothing without features. Both have 3 channels. Throws Error(kInput) if sizes
+/// differ.
 void follow_features(History& history, const Image& albedo, const Image& normal);
 
 /// Layers of a frame's file with R'_A, R'_B, albedo and normal: EstimatorResult::kept_samples.
@@ -64,18 +65,18 @@ struct HistoryInput {
   const Image* common_counts = nullptr;               ///< counts_of()
 };
 
-/// What squared errors of samples count: 1 / (F'^2 + 0.01) by the mean F of the frame's mixture and the history. By a
-/// picture made of the frame's samples alone, pixels that are bright by chance would count less, and with them what
-/// the history takes away. Throws Error(kInput) where sizes differ.
+/// The weights of squared errors of samples, 1 / (F'^2 + 0.01), 1 channel. F is the mean of `guide` and the history: an
+/// image of the frame's samples alone would give pixels that are bright by chance a low weight, just where history
+/// removes most. Throws Error(kInput) if sizes differ.
 Image counts_of(const History& history, const Image& guide);
 
-/// Adds History::samples to the frame's own: from Y, Y_A and Y_B to the mean of R'_A and R'_B and these. Bit-identical
-/// for any number of threads.
+/// Adds History::samples to the frame's own: `mean` and `halves` hold Y, Y_A and Y_B, and become R', R'_A and R'_B; for
+/// R', R is the mean of R_A and R_B. Bit-identical for any number of threads.
 void add_samples(const History& history, const HistoryInput& input, Image& mean, std::array<Image, 2>& halves);
 
-/// Adds the history to the frame's mixture and to its halves; `accumulated`: D and its halves, or null. The weights of
-/// `frame` become what is left to it; returned are those of C and D together, one channel. Bit-identical for any number
-/// of threads.
+/// Mixes the history into the frame's mixture and its halves; `accumulated`: D and its halves, or null. Returns the sum
+/// of the weights of C and D, one channel, and scales the weights of `frame` by the remainder up to 1. Bit-identical
+/// for any number of threads.
 Image add_history(const History& history, const HistoryInput& input, const Mixture* accumulated, Mixture& frame);
 
 }  // namespace covary

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Histories of known error: which are used, and how far a wrong one can lead.
+// Histories with known error: which are used, and how much harm a wrong one can do.
 #include "denoising/history.h"
 
 #include <gtest/gtest.h>
@@ -160,7 +160,7 @@ TEST(History, CountsErrorsOfSamplesAlikeWhereTheyAreBrightByChance) {
   std::array<Image, 2> counts = {Image(kSize, kSize, 1), Image(kSize, kSize, 1)};
   History same = history(flat(0, 0, 0));
   HistoryInput input = frame.input(same);
-  for (const int half : {0, 1}) {  // by pictures in which the half's noise is left
+  for (const int half : {0, 1}) {  // weights from pictures that still have the half's noise
     for (int y = 0; y < kSize; ++y)
       for (int x = 0; x < kSize; ++x)
         *counts[half].pixel(x, y) = 1 / (0.01f + std::pow(frame.independent[half].mean.row(0, y)[x], 2.0f));
@@ -170,7 +170,7 @@ TEST(History, CountsErrorsOfSamplesAlikeWhereTheyAreBrightByChance) {
   std::array<Image, 2> halves = {mean_image(frame.independent[0]), mean_image(frame.independent[1])};
   Image mean = halves[0];
   add_samples(same, input, mean, halves);
-  EXPECT_NEAR(mean_squared_error(halves[0]) / kNoise, 0.5, 0.03);  // 0.64 by those counts
+  EXPECT_NEAR(mean_squared_error(halves[0]) / kNoise, 0.5, 0.03);  // 0.64 with those weights
 }
 
 TEST(History, FollowsLightThatIsDimmed) {

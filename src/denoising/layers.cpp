@@ -11,7 +11,7 @@
 namespace covary {
 namespace {
 
-/// Mean of the layer's groups, each scaled as the picture's groups were limited, if `limited` is given.
+/// The mean of the layer's groups, each scaled as that of the picture was limited if `limited` is given.
 Image mean_of(const GroupedImage& layer, const GroupedImage& picture, const GroupedImage* limited,
               const std::vector<unsigned char>& valid) {
   std::vector<float> scaled;

@@ -4,8 +4,8 @@
 //
 //     L_k = d_k + sum_p x_p (C_p,k - d_k),
 //
-// d_k: mean of the layer's samples, C_p,k: candidate p of the layer. Filters are linear, so their layers add up; a
-// network's do not. The difference from the picture M is distributed in proportion to the layers' values,
+// d_k: mean of the layer's samples, C_p,k: candidate p of the layer. Filters with given weights are linear, so their
+// layers add up; a network's do not. The difference from the picture M is distributed in proportion to their values,
 //
 //     L'_k = L_k + (M - sum_j L_j) |L_k| / sum_j |L_j|,
 //
@@ -33,7 +33,7 @@ struct LayersInput {
 /// The layers, in their order.
 std::vector<Image> denoise_layers(const LayersInput& input);
 
-/// Makes images add up to `image`, as above. They have its size.
+/// Makes layers add up to `image`, as above. They have its size.
 void add_up(const Image& image, std::span<Image> layers);
 
 }  // namespace covary

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layers add up to the picture, and are denoised by its weights.
+// Layers add up to the picture and are denoised with its weights.
 #include "denoising/layers.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kWidth = 48, kHeight = 40, kGroups = 8;
 
-/// Groups of noisy samples around a level for each column, a part of which is direct.
+/// Groups of noisy samples around a brightness that depends on the column; part of it is direct light.
 struct Scene {
   std::vector<float> all, direct, indirect;
   Scene() {
@@ -48,7 +48,7 @@ double deviation(const Image& image, int first_x, int last_x) {
   return std::sqrt(squares / n - sum / n * (sum / n));
 }
 
-/// A network that takes light away, from dim layers more than from bright ones.
+/// A network that darkens, dim layers more than bright ones.
 CandidateMaker planted_network() {
   CandidateMaker maker;
   maker.names = {"planted"};

@@ -13,7 +13,7 @@ constexpr int kReach = kLimitWindow / 2;
 
 float brightness(const float* rgb) { return (rgb[0] + rgb[1] + rgb[2]) / 3; }
 
-/// The brightest of groups first, first + 2, … of each pixel; 0 if there are none.
+/// The brightness of the brightest of groups first, first + 2, … at each pixel; 0 if there are none.
 std::vector<float> brightest(const GroupedImage& image, const std::vector<unsigned char>& valid, int first) {
   std::vector<float> result(valid.size(), 0.0f);
   parallel_for(image.height, 16, [&](int y) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fireflies are limited; light that both halves of the groups find is not.
+// Fireflies are clamped; light that both halves of the groups find is not.
 #include "denoising/limited_groups.h"
 
 #include <gtest/gtest.h>
@@ -46,11 +46,11 @@ TEST(LimitedGroups, KeepsWhatTheOtherHalfFindsAround) {
   EXPECT_EQ(LimitedGroups(same_half.view(), same_half.valid).view().pixel(20, 10)[9], kBrighter);
 }
 
-// Nothing is like these two pixels, so that filters keep them.
+// No other pixels are like these two, so filters keep them.
 TEST(LimitedGroups, WhatTheNetworkDeniesIsInNoCandidate) {
   Picture p;
   for (int c = 0; c < 3; ++c) p.at(20, 10, 3)[c] = p.at(23, 7, 4)[c] = 100;
-  for (int i = 0; i < 3 * kGroups; ++i) p.at(5, 5, 0)[i] = 50;  // a small lamp, in all groups
+  for (int i = 0; i < 3 * kGroups; ++i) p.at(5, 5, 0)[i] = 50;  // a small light source, in all groups
   CandidateMaker network, filter;
   network.names = {"oidn"}, network.network = true;
   network.make = one_by_one([](const CandidateInput& in) {

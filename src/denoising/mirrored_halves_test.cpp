@@ -14,7 +14,7 @@ Image constant(float value) {
   return image;
 }
 
-/// Errs by 4 in the first column and by 8 in the first row of what it sees.
+/// A denoiser with an error of 4 in the first column and of 8 in the first row of the image it is given.
 Image wrong_at_the_edges(const Image& image, Mirror) {
   Image result = image;
   for (int y = 0; y < kHeight; ++y)

@@ -38,11 +38,11 @@ ModeSettings settings_of(DenoiseMode mode) {
   return *std::find_if(std::begin(kModes), std::end(kModes), [&](const ModeSettings& m) { return m.mode == mode; });
 }
 
-/// Memory beside that of the estimator, about: images of three sets of samples, planes of filters and sums, half of 12
-/// groups; of the mean, it without fireflies, and regression; with the network, what that takes and its candidates.
+/// Approximate memory on top of the estimator's: images of three sets of samples, planes of filters and sums, half of
+/// 12 groups; for a mean, the means without fireflies and regression; with the network, its own and its candidates.
 constexpr double kBytesPerPixel = 440, kBytesOfMean = 340, kBytesWithOidn = 1250;
 
-/// relMSE of the image itself, by its standard error.
+/// relMSE of the base image, from its standard error.
 double risk_of_base(const DenoisingPart& part, const Image& guide, const std::vector<unsigned char>& valid) {
   double sum = 0, n = 0;
   for (size_t i = 0; i < valid.size(); ++i) {
@@ -54,7 +54,8 @@ double risk_of_base(const DenoisingPart& part, const Image& guide, const std::ve
   return n > 0 ? sum / n : 0;
 }
 
-/// Those of the parts from the predicted one, by how held-out samples tell them apart.
+/// relMSE of the mixture, the base and each candidate: the mixture's prediction plus differences that held-out samples
+/// measure.
 MeasuredRisks risks_of(const DenoisingParts& parts, const std::array<CandidateSet, 2>& halves,
                        const std::vector<std::string>& names, const HeldOutInput& mixture, double predicted) {
   const HalvesRisk mixed = risk_of_halves(mixture);
@@ -70,7 +71,7 @@ MeasuredRisks risks_of(const DenoisingParts& parts, const std::array<CandidateSe
   return risks;
 }
 
-/// Of a mean.
+/// The denoised layers of a mean.
 std::vector<Image> layers_of(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
                              const MixedDenoising& mixture, std::span<const Layer> layers) {
   if (layers.empty()) return {};
@@ -138,8 +139,8 @@ Mixture mixture_of_halves(const std::array<Image, 2>& halves, const std::vector<
   return mix_parts(parts_of_mean(groups), makers, chosen).mixture;
 }
 
-/// Mixes the frames before in, and keeps samples for the next one, where a network takes part: what filters made of
-/// moved samples had 1.65 times the error of the frame alone in a region of a frame with a moving camera.
+/// Mixes in the history, and keeps samples for the next frame if a network denoises: filtered from reprojected samples,
+/// a region of a frame with a moving camera had 1.65 times the error of the frame alone.
 void use_history(const MixingHistory& use, const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
                  const PartsWeighting& chosen, const Image& frame_error, MixedParts& mixed,
                  std::vector<Image>& kept_samples) {
@@ -175,7 +176,7 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
   const std::array<const Image*, 2> images = {&mixture.halves[0], &mixture.halves[1]};
   const std::array<const Moments*, 2> independent = {&parts.halves[0].independent, &parts.halves[1].independent};
   Image place;
-  if (std_error || history.before || history.keep_samples)  // what asks for an error
+  if (std_error || history.before || history.keep_samples)  // all of these need an error
     place = disagreement(mixed.whole, guide_of(mixed.whole), mixture.image, valid);
   const HeldOutInput held_out{images, independent, &guide_of(mixed.whole), &valid, usual_error(makers), &place};
 
@@ -193,7 +194,7 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
     result.risk_kind = kind_of(makers, parts.is_mean);
     result.risks = risks_of(parts, mixed.halves, out.names, held_out, predicted_relmse(result));
   }
-  if (history.before || history.keep_samples) {  // after the error, which is that of the frame alone
+  if (history.before || history.keep_samples) {  // last: the error above is that of the frame alone
     const Image frame_error = std_error ? result.std_error : held_out_error(held_out);
     use_history(history, parts, makers, chosen, frame_error, mixed, result.kept_samples);
     result.estimate = std::move(mixture.image);
@@ -209,7 +210,7 @@ namespace {
 
 bool is_mean(const Estimator& estimator) { return estimator.passes == EstimatorPasses::kAny; }
 
-/// Whether halves of the samples are enough to judge candidates.
+/// Whether there are enough samples for halves to compare candidates.
 bool can_be_mixed(const GroupedImage& image) {
   if (image.groups < 2) return false;
   const size_t n_pixels = static_cast<size_t>(image.width) * image.height;
@@ -217,7 +218,7 @@ bool can_be_mixed(const GroupedImage& image) {
          std::all_of(image.counts, image.counts + n_pixels, [](uint32_t n) { return n >= kFewestMixedSamples; });
 }
 
-/// The candidate that was measured to be best where samples are few; without any the mean itself.
+/// The candidate that was best with few samples in measurements.
 MixedDenoising single_candidate(const GroupedImage& independent, const std::vector<CandidateMaker>& makers,
                                 std::span<const Layer> layers) {
   DenoisingParts parts = whole_of_mean(independent);
@@ -241,11 +242,11 @@ MixedDenoising single_candidate(const GroupedImage& independent, const std::vect
   return out;
 }
 
-/// What Estimator::apply and Estimator::stages have in common.
+/// Shared by Estimator::apply and Estimator::stages.
 using Run = std::function<MixedDenoising(const GroupedImage& crn, const GroupedImage& independent,
                                          const PairSettings& settings)>;
 
-/// denoise_by_mixture() with guides for the history, which are kept for the next frame.
+/// denoise_by_mixture(), with the frame's guides applied to the history and kept for the next frame.
 MixedDenoising denoise_frame(DenoisingParts parts, const std::vector<CandidateMaker>& makers,
                              const MixedDenoisingOptions& options, const PairSettings& settings,
                              std::span<const Layer> layers) {

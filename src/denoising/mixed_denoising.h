@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Denoising that knows its error (ours): an estimator's image and images with less noise and more bias (candidates.h),
-// mixed at each pixel in the proportions that held-out samples find best (mixture.h). The estimator uses two passes, or
-// is the mean of a single one.
+// Denoising with an error estimate (ours): mixes an estimator's image with images of less noise and more bias
+// (candidates.h), with weights per pixel that have the least error by held-out samples (mixture.h). The estimator uses
+// two passes, or is the mean of a single one.
 //
 // Claim: consistent if the estimator is, because the weights of biased candidates vanish as samples reveal the bias.
 // The error, including bias, is measured (held_out_error.h).
@@ -22,65 +22,66 @@
 
 namespace covary {
 
-/// What the mixture minimises, from least bias to least error.
+/// What the mixture minimises.
 enum class DenoiseMode {
   kNone,      ///< no denoising
   kAuto,      ///< least error, the default of renders
-  kBias,      ///< squared bias counts four times as much as variance; residual correction
-  kBalanced,  ///< twice as much; residual correction
+  kBias,      ///< 4 squared bias + variance; with residual correction
+  kBalanced,  ///< 2 squared bias + variance; with residual correction
   kError,     ///< least error
 };
 
-/// For a frame of a sequence, mixed in if there are enough samples for a mixture; layers do not use it.
+/// The history of a frame of a sequence. Mixed in if there are enough samples for a mixture; layers do not use it.
 struct MixingHistory {
-  std::shared_ptr<const History> before;  ///< of the previous frame; or null
-  bool keep_samples = false;              ///< EstimatorResult::kept_samples, of a mean denoised by a network
+  std::shared_ptr<const History> before;  ///< made of the previous frame; or null
+  bool keep_samples = false;              ///< fill EstimatorResult::kept_samples for the next frame
 };
 
 struct MixedDenoisingOptions {
   DenoiseMode mode = DenoiseMode::kBalanced;
-  bool use_oidn = true;  ///< use Open Image Denoise, if it is installed
-  DenoiseOptions oidn;   ///< path of its library; an error if it is not there
+  bool use_oidn = true;  ///< use Open Image Denoise if it is installed
+  DenoiseOptions oidn;   ///< its library; it is an error if a given path has none
   MixingHistory history;
 };
 
-/// Denoises the estimator's image. `base` is either a two-pass estimator that predicts its error, and the result needs
-/// twice its groups; or the mean, and the result takes a single pass (EstimatorPasses::kIndependent), mixed with at
-/// least kFewestMixedSamples samples and otherwise the best single candidate. Reads guides and needs the whole image.
-/// Throws Error(kUsage) for any other base.
+/// Denoises the estimator's image. `base` is a two-pass estimator that predicts its error, or the mean. For the former,
+/// the result needs twice its groups. For the mean, it takes a single pass (EstimatorPasses::kIndependent): a mixture
+/// from kFewestMixedSamples samples on, and the best single candidate with fewer. Reads guides and needs the whole
+/// image. Throws Error(kUsage) for any other base.
 Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& options);
 
-/// Whether an estimator can be the base.
+/// Whether with_denoising() takes the estimator as base.
 bool can_be_denoised(const Estimator& estimator);
 
-/// MixedDenoisingOptions as texts, as the command line has them.
+/// MixedDenoisingOptions as text, as on the command line.
 struct DenoisingChoice {
   std::string mode = "none";  ///< one of denoise_mode_names()
-  std::string oidn;           ///< a library or its folder; "": searched for, "off": not used
-  MixingHistory history;      ///< MixedDenoisingOptions::history; there is no text for it
+  std::string oidn;           ///< a library or its folder; "": search for it, "off": do not use it
+  MixingHistory history;      ///< MixedDenoisingOptions::history; not an option
   bool denoises() const { return mode != "none"; }
   bool uses_oidn() const { return denoises() && oidn != "off"; }
 };
-/// `is_all`: the caller uses Open Image Denoise for nothing else, so `oidn` without `denoise` is an error.
+/// `is_all`: the caller has no other use for Open Image Denoise, so `oidn` without `denoise` is an error.
 void declare(Settings& settings, DenoisingChoice& choice, bool is_all = true);
 constexpr const char* kNotDenoised = "without `denoise` auto, bias, balanced or error";
 
-/// The note that Open Image Denoise is wanted but missing, and how to get it; empty if it is found or not wanted.
+/// A note that Open Image Denoise is missing, and how to get it; empty if it is found or not to be used.
 std::string missing_network(const DenoisingChoice& choice);
 
-/// Implements with_denoising(), for any candidates.
+/// Result of denoise_by_mixture().
 struct MixedDenoising {
   EstimatorResult result;
   std::vector<std::string> names;  ///< of the candidates
   std::vector<Image> candidates;   ///< made of all samples
   std::vector<Image> weights;      ///< one channel each
 };
-/// `std_error`: estimate the result's error. `layers`: of a mean; the result then has layers, too.
+/// Implements with_denoising() for any candidates. `std_error`: estimate the result's error. `layers`: denoise these
+/// layers of a mean, too.
 MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<CandidateMaker>& makers, DenoiseMode mode,
                                   bool std_error, std::span<const Layer> layers = {},
                                   const MixingHistory& history = {});
 
-/// Samples per pixel from which on halves, of two groups or more, can judge candidates.
+/// The smallest number of samples per pixel, in two groups or more, with which halves can compare candidates.
 inline constexpr int kFewestMixedSamples = 4;
 
 /// The modes by name, "none" first.

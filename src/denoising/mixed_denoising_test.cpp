@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// --denoise as a whole, on synthetic images; planted candidates; pictures that are unusual.
+// --denoise as a whole, on synthetic images; planted candidates; unusual pictures.
 #include "denoising/mixed_denoising.h"
 
 #include <gtest/gtest.h>
@@ -55,7 +55,7 @@ Image iicv_of(const Inputs& in) {
   return make_estimator("iicv").apply(in.crn.view(), in.independent.view(), {}).estimate;
 }
 
-/// What the outliers, 5 times as bright on 1 % of the values, add to the mean.
+/// Mean of the samples relative to test::expected(): outliers add 5 times that to 1 % of them.
 constexpr float kOutliers = 1.05f;
 
 Image truth(float scale = 1) {
@@ -109,8 +109,8 @@ double mean_square(const Image& image) {
   return sum / static_cast<double>(image.data.size());
 }
 
-// The weights were chosen by both halves, so that these follow each other's samples, and the error told is too small
-// where noise is strong; the fit of error_interval.h knows that.
+// Both halves chose the weights, so their images depend on each other's samples and the predicted error is too small
+// where noise is strong; the fit of error_interval.h accounts for that.
 TEST(MixedDenoising, OfASinglePassTellsItsErrorByItsSamples) {
   const EstimatorResult result = denoised_mean(Inputs(1).independent, DenoiseMode::kAuto);
   EXPECT_EQ(result.risk_kind, ErrorKind::kFilters);
@@ -193,7 +193,7 @@ TEST(MixedDenoising, TellsItsBiasAndTheErrorsOfItsParts) {
       for (int x = 0; x < kWidth; ++x)
         for (int c = 0; c < 3; ++c)
           error += std::pow(part.pixel(x, y)[c] - exact.pixel(x, y)[c], 2) * relative_weight(exact.pixel(x, y));
-    // Halves of so few pixels tell little of the bias of all samples.
+    // With so few pixels, halves say little about the bias of the whole image.
     const double ratio = relmse / (error / (3 * kWidth * kHeight)), most = name == "mean" ? 1.2 : 3;
     EXPECT_LT(std::max(ratio, 1 / ratio), most) << name;
   }
@@ -238,7 +238,7 @@ TEST(MixedDenoising, OfASinglePassDoesNotDependOnThreads) {
   EXPECT_EQ(together.std_error.data, alone.std_error.data);
 }
 
-/// A denoiser that makes everything too dark, and keeps the edges.
+/// For a denoiser that makes everything too dark but keeps the edges.
 TEST(MixedDenoising, ResidualGivesBackWhatPixelsAlikeLack) {
   const Inputs in(10, kWidth, kHeight, 12, 0);
   const std::vector<unsigned char> valid(static_cast<size_t>(kWidth) * kHeight, 1);
@@ -275,8 +275,7 @@ TEST(MixedDenoising, GivesTheNetworkGuidesBehindGlass) {
   EXPECT_EQ(network_guides(half).albedo, &images[0]) << "both of the same surface";
 }
 
-/// A denoiser sees no fireflies, the mean keeps them.
-/// Frames of one scene at rest, denoised by what leaves them as they are: the error falls with the frames' number.
+/// Frames of a static scene and a denoiser that changes nothing: the error falls with the number of frames.
 TEST(MixedDenoising, OfFramesUsesSamplesOfFramesBefore) {
   CandidateMaker same;
   same.names = {"same"};
@@ -336,7 +335,7 @@ TEST(MixedDenoising, DoesNotDependOnThreads) {
   EXPECT_EQ(together.std_error.data, alone.std_error.data);
 }
 
-/// Candidates that a broken denoiser might give, beside the good ones.
+/// Candidates that a broken denoiser might give, beside good ones.
 TEST(MixedDenoising, GivesBadCandidatesNoWeightAndAPerfectOneMost) {
   const Inputs in(4, kWidth, kHeight, 12, 0);
   CandidateMaker planted;

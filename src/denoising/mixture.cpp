@@ -16,7 +16,7 @@ namespace {
 
 using namespace lanes;
 
-/// Sums of normal equations in every lane; v is the variance of the halves' U_p, summed over p.
+/// Sums of normal equations, a pixel per lane; the last is v, the variance of the halves' U_p, summed over p.
 using Sums = std::array<vfloat, n_normal_sums(kMostCandidates)>;
 using Weights = std::array<float, kMostCandidates>;
 
@@ -35,10 +35,10 @@ void add_pixel(const MixtureInput& in, int m, int x, int y, float* sums) {
       for (int p = 0; p < m; ++p) u[half][p][c] = set.candidates[p].pixel(x, y)[c] - f[c];
     }
   }
-  // Error of the halves without 1 - 1 / bias_share of the variance: squared bias + variance / bias_share.
+  // The halves' squared error minus (1 - 1 / bias_share) variance, that is, squared bias + variance / bias_share.
   const float variance = 0.25f * (weight[0] + weight[1]);
-  // Of a mean, a firefly of one half has a small weight there and a large one in the other half, which would count more
-  // noise than there is.
+  // For a mean, a firefly has a small weight in its own half and a large one in the other, which would overrate the
+  // noise. So the smaller weight counts.
   const float certain = in.counts[0] ? 0.5f * std::min(weight[0], weight[1]) : variance;
   const float removed = (1 - 1 / in.bias_share) * certain;
   int plane = 0;
@@ -57,7 +57,7 @@ void add_pixel(const MixtureInput& in, int m, int x, int y, float* sums) {
     for (int c = 0; c < 3; ++c) sums[plane] += variance * sqr(u[0][p][c] - u[1][p][c]);
 }
 
-/// The weights that are best for the whole image, if all pixels have the same.
+/// x0: the best weights for the whole image if all pixels have the same.
 Weights weights_everywhere(const MixtureInput& in, int m) {
   const int width = in.guide->width, height = in.guide->height;
   std::vector<std::array<float, std::tuple_size_v<Sums>>> rows(static_cast<size_t>(height));
@@ -80,7 +80,7 @@ Weights weights_everywhere(const MixtureInput& in, int m) {
   return weights;
 }
 
-/// base + sum x (candidates - base), where valid.
+/// base + sum_p x_p (candidate_p - base) at valid pixels, otherwise base.
 Image mixed(const CandidateSet& set, const std::vector<Image>& weights, const std::vector<unsigned char>& valid) {
   Image result = set.base;
   parallel_for(result.height, 8, [&](int y) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Weights where the best ones are known, and the error estimate from held-out samples on data of known error.
+// Mixtures whose best weights are known, and the held-out error estimate on data with known error.
 #include "denoising/mixture.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ namespace {
 constexpr int kSize = 48;
 constexpr float kTruth = 0.5f;
 
-/// A flat picture with uniform noise of this variance in every value, and an offset.
+/// A flat picture plus an offset and uniform noise of this variance in every value.
 Image flat(float offset, double variance, uint64_t seed) {
   Image image(kSize, kSize, 3);
   const auto width = static_cast<float>(std::sqrt(12 * variance));
@@ -40,7 +40,7 @@ Image average(const Image& a, const Image& b) {
   return mean;
 }
 
-/// Independent images of two halves with these variances, and what methods made of them.
+/// Independent images of two halves with this variance, and mixtures that they judge.
 struct Experiment {
   static constexpr double kVariance = 0.04;  // of a half's independent image
   Moments independent[2];
@@ -75,8 +75,8 @@ double mean_weight(const Mixture& mixture, size_t candidate) {
   return sum / (kSize * kSize);
 }
 
-/// Base without bias and with variance v in a half, candidate with bias b and no variance: the half's error is
-/// x^2 b^2 + (1 - x)^2 v, least at x = v / (b^2 + v).
+/// The base has no bias and a variance of v per half, the candidate a bias of b and no variance: a half's error
+/// x^2 b^2 + (1 - x)^2 v is least at x = v / (b^2 + v).
 TEST(Mixture, FindsTheWeightOfLeastError) {
   const Experiment experiment(1);
   const double v = 0.01;
@@ -88,13 +88,13 @@ TEST(Mixture, FindsTheWeightOfLeastError) {
           },
           bias_share);
       const double weighted = bias_share * b * b, best = v / (weighted + v);
-      // Noise of h in the sums leaves about 0.03 of the weight uncertain.
+      // The noise of h leaves the weight uncertain by about 0.03.
       EXPECT_NEAR(mean_weight(mixture, 0), best, 0.1) << b << " " << bias_share;
     }
 }
 
-/// Means whose errors count by their own standard error, as of independent samples with few fireflies: those of one
-/// half, weighted as pixels of the other, are no variance of the mean that a candidate lacks.
+/// Means weighted by their own standard error, with a few fireflies. One half's fireflies, weighted like the other
+/// half's pixels, must not pass for variance of the mean, which a larger bias_share would keep.
 TEST(Mixture, LeavesNoFirefliesWhereBiasCountsMore) {
   const Image clean = flat(0.02f, 0, 0);
   CandidateSet halves[2] = {{flat(0, 0.04, 11), {clean}}, {flat(0, 0.04, 12), {clean}}};
@@ -134,8 +134,8 @@ TEST(Mixture, GivesAPerfectCandidateTheWholeAndBadOnesNothing) {
   EXPECT_LT(mean_weight(base, 1), 0.02);
 }
 
-/// A candidate that is right on the left, two thirds of the picture, and wrong on the right, which the guide tells
-/// apart: its weight there.
+/// The weight, on the right, of a candidate that is right in the left two thirds of the picture and wrong on the right;
+/// the guide separates both.
 float weight_where_wrong(double variance, float prior) {
   Experiment experiment(5);
   const auto is_right = [](int x) { return x >= 2 * kSize / 3; };
@@ -153,7 +153,7 @@ float weight_where_wrong(double variance, float prior) {
 }
 
 TEST(Mixture, TheWholeImagesWeightsCountOnlyWhereThereIsNoise) {
-  // v / (b^2 + v) is 0.25 there, 0.5 with the mean b^2 of the whole image, and (v + 10 v 0.5) / (b^2 + v + 10 v) 0.43.
+  // v / (b^2 + v) = 0.25 there, x0 = 0.5 with the whole image's mean b^2; (v + 10 v x0) / (b^2 + v + 10 v) = 0.43.
   EXPECT_NEAR(weight_where_wrong(0.03, 0), 0.25, 0.1);
   EXPECT_NEAR(weight_where_wrong(0.03, 10), 0.43, 0.08);
   EXPECT_LT(weight_where_wrong(1e-4, 10), 0.02);
@@ -202,15 +202,15 @@ TEST(Mixture, KeepsTheBaseWhereNothingIsValid) {
   EXPECT_NE(mixture.image.pixel(5, 1)[1], base.pixel(5, 1)[1]);
 }
 
-/// Student's t of the predicted minus the true squared error over 32 experiments: |t| beyond 5.5 has a probability of
-/// 5e-6. The standard deviation of a difference is about 7 % of the error, so that 7 % too much or too little is seen.
+/// Student's t of the predicted minus the true squared error over 32 experiments: P(|t| > 5.5) = 5e-6. The standard
+/// deviation of a difference is about 7 % of the error, so that a prediction 7 % too large or too small is detected.
 double t_of_prediction(float bias, bool held_out) {
   constexpr int kRuns = 32;
   double sum = 0, squares = 0;
   for (uint64_t seed = 1; seed <= kRuns; ++seed) {
     const Experiment e(seed);
     const Image a = flat(bias, 0.002, 100 * seed + 11), b = flat(bias, 0.002, 100 * seed + 12);
-    // Held out: the other half's samples. Otherwise, as a planted error, the images judge themselves.
+    // Held out: the other half's samples. Otherwise, as a planted bug, each image is compared with its own samples.
     const Moments own[2] = {moments_of(a, 0.002f), moments_of(b, 0.002f)};
     const Image error =
         held_out_error({{&a, &b},
@@ -231,13 +231,13 @@ double t_of_prediction(float bias, bool held_out) {
 TEST(HeldOutError, IsUnbiased) {
   EXPECT_LT(std::abs(t_of_prediction(0.05f, true)), 5.5);
   EXPECT_LT(std::abs(t_of_prediction(0.1f, true)), 5.5);
-  // Images that are judged by themselves seem to have no bias.
+  // Compared with their own samples, images seem to have no bias.
   EXPECT_GT(std::abs(t_of_prediction(0.1f, false)), 5.5);
 }
 
 TEST(HeldOutError, IsTheUsualOneWhereHeldOutSamplesAreNoise) {
   Experiment e(5);
-  for (int c = 0; c < 3; ++c) e.independent[0].mean.row(c, 20)[30] += 30;  // a light that one path has found
+  for (int c = 0; c < 3; ++c) e.independent[0].mean.row(c, 20)[30] += 30;  // a firefly
   const Image a = flat(0, 0.002, 11), b = flat(0, 0.002, 12);
   const Image error = held_out_error({{&a, &b}, {&e.independent[0], &e.independent[1]}, &e.guide, &e.valid, 0.65});
   double sum = 0;
@@ -252,7 +252,7 @@ TEST(HeldOutError, IsWhereImagesDisagreeAndAsLargeInAll) {
   const Image a = flat(0, 0.002, 13), b = flat(0, 0.002, 14);
   HeldOutInput input{{&a, &b}, {&e.independent[0], &e.independent[1]}, &e.guide, &e.valid};
   const Image before = held_out_error(input);
-  Image image = flat(0, 0, 0), candidate = image;  // a disagreement of 0.1 to the left, of 0.4 to the right
+  Image image = flat(0, 0, 0), candidate = image;  // a disagreement of 0.1 on the left, of 0.4 on the right
   for (int y = 0; y < kSize; ++y)
     for (int x = 0; x < kSize; ++x)
       for (int c = 0; c < 3; ++c) candidate.pixel(x, y)[c] += x < kSize / 2 ? 0.1f : 0.4f;
@@ -273,7 +273,7 @@ TEST(HeldOutError, IsWhereImagesDisagreeAndAsLargeInAll) {
   EXPECT_NEAR(ends[1] / ends[0], 16, 2);
 }
 
-/// Rows of an image whose held-out error is `error` in each of `n` parts, give or take `spread`.
+/// A result with `n` rows of held-out error, each `error` plus or minus `spread`.
 EstimatorResult with_rows(double error, double variance, double predicted, double spread, int n) {
   EstimatorResult result;
   result.std_error = Image(1, 1, 3);
@@ -292,12 +292,12 @@ double calibrated(EstimatorResult result) {
 }
 
 TEST(Calibration, TrustsHeldOutSamplesAsFarAsTheyKnow) {
-  // Without noise: squared bias 1 and variance 2 of a half make 2 of the whole.
+  // Without noise: a squared bias of 1 and a half's variance of 2 give an error of 2 for the whole.
   EXPECT_NEAR(calibrated(with_rows(3, 2, 1, 0, 100)), 2, 1e-5);
   EXPECT_NEAR(calibrated(with_rows(3, 2, 4, 0, 100)), 0.5, 1e-5);
-  // A relative standard error of 0.3: half of the way, in logarithms.
+  // A relative standard error of 0.3: halfway, in logarithms.
   EXPECT_NEAR(calibrated(with_rows(3, 2, 8, 0.3 * 3 * 10, 100)), 0.5, 1e-3);
-  // Noise alone, or nothing: the estimator's own prediction.
+  // Only noise, or no data: the estimator's own prediction.
   EXPECT_NEAR(calibrated(with_rows(3, 2, 8, 1e4, 100)), 1, 0.01);
   EXPECT_EQ(calibrated(with_rows(-1, 2, 8, 0, 100)), 1);
   EXPECT_EQ(calibrated(with_rows(3, 2, 8, 0, 0)), 1);

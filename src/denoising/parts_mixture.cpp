@@ -12,12 +12,12 @@
 namespace covary {
 namespace {
 
-/// Of the mean: what its variance counts beside its square, and how much the weights of the whole image count; both
-/// measured (docs/methods/denoising.md).
+/// For the mean: the factor of its variance in counts_of(), and MixtureInput::prior; both measured
+/// (docs/methods/denoising.md).
 constexpr float kCountOfVariance = 2, kPriorOfMean = 10;
 
-/// Weights of candidates around a mean that have the least error with 16 samples if all pixels of all scenes have the
-/// same; measured (docs/notes/denoising.md).
+/// Typical weights of a mean's candidates: those of least error with 16 samples if all pixels of all scenes have the
+/// same. Measured (docs/notes/denoising.md).
 struct UsualWeight {
   const char* name;
   float with_network, without;
@@ -28,11 +28,11 @@ constexpr UsualWeight kUsual[] = {{"oidn", 0.85f, 0},
                                   {"sharp", 0.05f, 0.1f},
                                   {"demodulated", 0.05f, 0.1f}};
 
-/// How much usual weights count for those of the whole image, with so many samples per pixel or fewer; less with more.
+/// MixtureInput::usual_count up to kSamplesOfUsual samples per pixel; with more, it falls inversely to their number.
 constexpr float kCountOfUsual = 0.2f, kSamplesOfUsual = 16;
 
-/// What errors of a half's pixels count where its image is noisy: 1 / (G'^2 + 0.01 + 2 s^2), G: the image with little
-/// noise, s: the standard error. By the noisy image itself, pixels that are bright by chance would count little.
+/// The weights of squared errors of a half's noisy image, 1 / (G'^2 + 0.01 + 2 s^2), G: an image with little noise, s:
+/// the standard error. Weighted by the noisy image itself, pixels that are bright by chance would count little.
 Image counts_of(const DenoisingPart& part, const Image& guide) {
   Image counts(guide.width, guide.height, 1);
   parallel_for(guide.height, 16, [&](int y) {
@@ -49,7 +49,7 @@ float count_of_usual(const GroupedImage& image) {
   return kCountOfUsual * static_cast<float>(std::min(1.0, kSamplesOfUsual / std::max(mean_samples(image), 1.0)));
 }
 
-/// Of all candidates, with a sum of 1; empty where none is known.
+/// The typical weights of the candidates, with a sum of 1; empty if none is known.
 std::vector<float> usual_weights(const std::vector<CandidateMaker>& makers) {
   const bool network = has_network(makers);
   std::vector<float> weights;
@@ -66,9 +66,9 @@ std::vector<float> usual_weights(const std::vector<CandidateMaker>& makers) {
   return weights;
 }
 
-/// A pixel that no other is like keeps a firefly in every filter's image. So candidates are at most so many times as
-/// bright as the network's image, the first candidate, in the 3 x 3 pixels around, or as bright as two standard errors
-/// below the pixel itself.
+/// A pixel unlike all others keeps its firefly in every filtered image. So candidates are clamped to the larger of two
+/// brightnesses: this factor times the brightest of the 3 x 3 pixels of the network's image, the first candidate, and
+/// the estimate minus two standard errors.
 constexpr float kBrighterThanNetwork = 1.5f;
 
 void limit_by_network(const CandidateInput& in, CandidateSet& set) {

@@ -14,7 +14,7 @@ namespace covary {
 struct PartsWeighting {
   float bias_share = 1;              ///< MixtureInput::bias_share
   float prior = 0;                   ///< MixtureInput::prior for pairs
-  bool residual_correction = false;  ///< typical weights, for pairs
+  bool residual_correction = false;  ///< add it to the mixture, for pairs
 };
 
 struct MixedParts {
@@ -24,21 +24,18 @@ struct MixedParts {
   Mixture mixture;
 };
 
-/// The input of candidates; `h`: the mean of the part's independent image. All must outlive the result.
+/// The input for candidates of a part. `h`: mean of its independent image. The arguments must outlive the result.
 CandidateInput input_of(const DenoisingPart& part, const Image& h, const std::vector<unsigned char>& valid);
 
-/// The candidates of each part.
+/// Each part's image and candidates.
 std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>& parts,
                                         const std::vector<unsigned char>& valid,
                                         const std::vector<CandidateMaker>& makers);
 
-/// The first candidate: the image with little noise.
+/// The first candidate, an image with little noise.
 inline const Image& guide_of(const CandidateSet& set) { return set.candidates[0]; }
 
-/// Samples per pixel; without counts, one in each group.
-double mean_samples(const GroupedImage& image);
-
-/// Whether any of them come from a neural network.
+/// Whether any candidates come from a neural network.
 bool has_network(const std::vector<CandidateMaker>& makers);
 
 MixedParts mix_parts(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
