@@ -25,7 +25,7 @@ Image history_features(const Image& albedo, const Image& normal) {
 FeatureSlopes feature_slopes(const Image& picture, const Image& features, int x, int y) {
   using Features = Eigen::Matrix<float, kHistoryFeatures, 1>;
   using Colour = Eigen::Vector3f;
-  // Differences from the pixel in the middle, so that sums of squares keep their digits.
+  // Differences from the centre pixel avoid cancellation in sums of squares.
   const Eigen::Map<const Features> own_features(features.pixel(x, y));
   const Eigen::Map<const Colour> own_colour(picture.pixel(x, y));
   Features sum = Features::Zero();

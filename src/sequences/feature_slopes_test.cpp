@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kSide = 9;
 
-/// Features that vary independently of each other, and a picture that depends on the first and the fifth.
+/// Independent features, and a picture that depends on the first and the fifth.
 void fill(Image& features, Image& picture) {
   for (int y = 0; y < kSide; ++y)
     for (int x = 0; x < kSide; ++x) {

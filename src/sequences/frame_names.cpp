@@ -24,7 +24,7 @@ std::optional<int> frame_number(const std::string& text) {
   return std::stoi(text);
 }
 
-/// A pattern around its run of '#'.
+/// A pattern split at its run of '#'.
 struct Parts {
   std::string before, after;
   size_t digits = 0;
@@ -74,8 +74,8 @@ std::string frame_name(const std::string& pattern, int frame) {
 }
 
 std::vector<int> frames_on_disk(const std::string& pattern) {
-  parts_of(pattern);                   // throws where there is no '#'
-  fs::path head = pattern, in_folder;  // as far as the part with the number, and what follows
+  parts_of(pattern);                   // throws if there is no '#'
+  fs::path head = pattern, in_folder;  // up to the component with the number, and the rest
   for (; !is_frame_pattern(head.string()); head = head.parent_path())
     in_folder = in_folder.empty() ? head.filename() : head.filename() / in_folder;
   const Parts parts = parts_of(head.filename().string());
@@ -89,7 +89,7 @@ std::vector<int> frames_on_disk(const std::string& pattern) {
       continue;
     const std::string digits = name.substr(parts.before.size(), name.size() - parts.before.size() - parts.after.size());
     const std::optional<int> frame = frame_number(digits);
-    // Only the name that frame_name() gives: "out_7.exr" is no frame of "out_####.exr".
+    // Only names that frame_name() gives: "out_7.exr" is not a frame of "out_####.exr".
     if (frame && *frame <= kLastFrame && digits == fmt::format("{:0{}}", *frame, parts.digits) &&
         (in_folder.empty() || fs::exists(entry.path() / in_folder)))
       frames.push_back(*frame);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// File names of sequences, with a run of '#' for the frame number, padded to at least that many digits: "out_####.exr"
-// stands for out_0001.exr, out_0002.exr, …
+// File names of sequences. A run of '#' stands for the frame number, padded to at least that many digits:
+// "out_####.exr" means out_0001.exr, out_0002.exr, …
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace covary {
 
-/// Frames first … last, every `step`th.
+/// Frames first, first + step, … up to last.
 struct FrameRange {
   int first = 0, last = 0, step = 1;
   std::vector<int> numbers() const;
@@ -20,14 +20,14 @@ bool read_frame_range(const std::string& text, FrameRange& range);
 /// Whether the last component of the path contains a run of '#'.
 bool is_frame_pattern(const std::string& pattern);
 
-/// The same for a file to read, whose frames may also be in separate folders: "passes_####/crn.exr". False if a file
-/// has exactly that name.
+/// The same for an input, whose '#' may also be in a folder's name: "passes_####/crn.exr". False if a file has exactly
+/// that name.
 bool is_frame_pattern_of_input(const std::string& pattern);
 
-/// The file of a frame: replaces the last run of '#'. Throws Error(kUsage) if there is none.
+/// The path of a frame: replaces the last run of '#'. Throws Error(kUsage) if there is none.
 std::string frame_name(const std::string& pattern, int frame);
 
-/// The frame numbers of the existing files, ascending. Throws like frame_name(), and Error(kIo) if the folder cannot be
+/// Frame numbers of the existing files, ascending. Throws like frame_name(), and Error(kIo) if the folder cannot be
 /// read.
 std::vector<int> frames_on_disk(const std::string& pattern);
 

@@ -17,7 +17,7 @@
 namespace covary {
 namespace {
 
-/// The layer with this name or, because Blender prefixes the view layer's name, the only one whose last part has it.
+/// The layer with this name or, because Blender prefixes the view layer's name, the only one that ends with it.
 std::string layer_of(const ExrFile& file, const std::string& name) {
   std::set<std::string> found;
   for (const ExrFile::Channel& channel : file.channels()) {
@@ -28,7 +28,7 @@ std::string layer_of(const ExrFile& file, const std::string& name) {
   return found.size() == 1 ? *found.begin() : name;
 }
 
-/// Both channels, and what they are multiplied by.
+/// Both channels and their scale factors.
 struct MotionChannels {
   std::array<std::string, 2> names;
   float scale_x, scale_y;
@@ -41,7 +41,7 @@ std::optional<MotionChannels> motion_channels(const ExrFile& file, const MotionS
     if (file.find(layer + x) && file.find(layer + y))
       return MotionChannels{
           {layer + x, layer + y}, source.scale_x, source.scale_y, source.motion == MotionSource().motion};
-  // Blender's pass: its first two channels point to the previous frame, with Y up; the others to the next frame.
+  // Blender's pass: the first two channels point to the previous frame, with Y up; the others to the next frame.
   const std::string vector = layer_of(file, "Vector");
   if (source.motion == MotionSource().motion && file.find(vector + ".X") && file.find(vector + ".W"))
     return MotionChannels{{vector + ".X", vector + ".Y"}, source.scale_x, -source.scale_y};
@@ -92,7 +92,7 @@ MotionLayers read_motion(const std::string& path, const MotionSource& source) {
 }
 
 double misfit(const Image& before, const Image& now, const MotionLayers& motion) {
-  // Depth is the renderer's, and not what is tested.
+  // Only motion is tested, so depth is left out.
   MotionLayers only_motion = motion;
   only_motion.depth = Image(now.width, now.height, 1);
   const History moved = reproject(before, only_motion.depth, only_motion);

@@ -16,7 +16,7 @@ constexpr int kWidth = 24, kHeight = 16;
 
 class MotionFile : public testing::Test {
  protected:
-  /// Channels of one value each.
+  /// Path of a file with constant channels.
   std::string file(const std::vector<std::pair<std::string, float>>& channels) {
     const std::string path = folder_.file("f.exr");
     std::vector<Image> images;

@@ -17,20 +17,20 @@ namespace covary {
 namespace {
 
 constexpr float kAtRest = 1e-3f;          // pixels
-constexpr float kEdge = 0.25f;            // pixels of motion from a pixel to the next
-constexpr float kOfEdges = 0.2f;          // of the largest squared difference there
-constexpr float kRelative = 0.01f;        // of the depth that a pixel may differ by
-constexpr float kRelativeUnknown = 0.1f;  // where its change is not known
+constexpr float kEdge = 0.25f;            // difference of neighbours' motions, pixels
+constexpr float kOfEdges = 0.2f;          // fraction of edge_error() that counts
+constexpr float kRelative = 0.01f;        // tolerance of depth, relative
+constexpr float kRelativeUnknown = 0.1f;  // the same if its change is not known
 constexpr int kSlopes = std::tuple_size_v<FeatureSlopes>;
-constexpr float kOfSlope = 1.5f;  // and of the depth's change from pixel to pixel
+constexpr float kOfSlope = 1.5f;  // tolerance of depth, relative to its change between pixels
 
 struct Tap {
-  int first;                     // of four pixels
+  int first;                     // index of the first of four pixels
   std::array<float, 4> weights;  // Catmull-Rom
-  float part;                    // of the third pixel, of the two in the middle
+  float part;                    // linear weight of the third pixel; the second has the rest
 };
 
-/// Around the position `at`, in pixels with centres at + 0.5.
+/// The tap at a position in pixels, whose centres are at + 0.5.
 Tap tap(float at) {
   const float shifted = at - 0.5f, base = std::floor(shifted), t = shifted - base;
   return {static_cast<int>(base) - 1,
@@ -39,7 +39,7 @@ Tap tap(float at) {
           t};
 }
 
-/// Depth's smallest change to a neighbour along each axis: that of the surface, not of an edge.
+/// Sum over the axes of depth's smaller change to a neighbour, which is the surface's rather than an edge's.
 float slope(const Image& depth, int x, int y) {
   const float here = *depth.pixel(x, y);
   const auto change = [&](int dx, int dy) {
@@ -51,11 +51,11 @@ float slope(const Image& depth, int x, int y) {
   return (std::isfinite(along_x) ? along_x : 0) + (std::isfinite(along_y) ? along_y : 0);
 }
 
-/// Where a pixel's point was.
+/// The position of a pixel's point in the previous frame.
 struct Place {
   int x, y;
   bool rests;
-  Tap h, v;  // where it does not rest
+  Tap h, v;  // horizontal and vertical; unused if it rests
 
   /// The pixel that it was in.
   std::array<int, 2> pixel(const Image& image) const {
@@ -64,7 +64,7 @@ struct Place {
             std::clamp(v.first + (v.part < 0.5f ? 1 : 2), 0, image.height - 1)};
   }
 
-  /// The value of an image there; `difference`: that to linear interpolation.
+  /// The value of an image there; `difference`: minus bilinear interpolation, before clamping.
   float value(const Image& image, int c, float& difference) const {
     difference = 0;
     if (rests) return image.pixel(x, y)[c];
@@ -84,12 +84,12 @@ struct Place {
   }
 };
 
-/// Where the points of a frame were in the one before.
+/// Finds the points of a frame in the previous one.
 class Reprojection {
  public:
   Reprojection(const Image& depth_before, const MotionLayers& now) : depth_before_(depth_before), now_(now) {}
 
-  /// Nothing where that is not known.
+  /// Nothing if it is unknown.
   std::optional<Place> place(int x, int y) const {
     const float* motion = now_.motion.pixel(x, y);
     if (std::abs(motion[0]) < kAtRest && std::abs(motion[1]) < kAtRest) {
@@ -128,7 +128,7 @@ struct Shown {
   std::array<float, kHistoryFeatures> features = {};
 };
 
-/// A difference of colours beyond that of features: its square, mean over the channels.
+/// The squared difference of colours that the features do not explain, averaged over the channels.
 float squared(const Shown& difference, const FeatureSlopes& slopes) {
   float squares = 0;
   for (size_t c = 0; c < 3; ++c) {
@@ -145,7 +145,7 @@ Shown operator-(Shown a, const Shown& b) {
   return a;
 }
 
-/// The frame before.
+/// The previous frame.
 struct Before {
   const Image& picture;
   const Image& features;  // or empty
@@ -158,8 +158,7 @@ struct Before {
     return feature_slopes(picture, features, x, y);
   }
 
-  /// Its pixel, moved to where it is now; nothing where a value is not finite. `difference`: that to linear
-  /// interpolation.
+  /// Its interpolated values; nothing if one is not finite. `difference`: minus bilinear interpolation.
   std::optional<Shown> at(const Place& place, Shown& difference) const {
     Shown moved;
     bool is_finite = true;
@@ -174,9 +173,9 @@ struct Before {
   }
 };
 
-/// Takes the samples of the pixel where the point was, as they are: mixed with others they would have noise that is
-/// alike in neighbouring pixels, which denoisers take for detail. What the picture `moved` differs by from that pixel
-/// of `before` is added. Whether the value is finite.
+/// Copies the samples of the pixel where the point was: interpolation would correlate the noise of neighbouring pixels,
+/// which denoisers take for detail. `moved`, the interpolated picture, minus that pixel of `before` is added. Returns
+/// whether the value is finite.
 bool move_samples(const Image& samples, const Image& before, const Place& place, const float* moved, float* value) {
   const auto [x, y] = place.pixel(before);
   bool finite = true;
@@ -187,7 +186,7 @@ bool move_samples(const Image& samples, const Image& before, const Place& place,
   return finite;
 }
 
-/// Whether `is_so` of a motion in the surrounding 3 x 3 pixels that differs from that of (x, y).
+/// Whether `is_so` holds for a motion in the surrounding 3 x 3 pixels that differs from that of (x, y).
 template <class F>
 bool any_other_motion(const Image& motion, int x, int y, const F& is_so) {
   const float* here = motion.pixel(x, y);
@@ -200,8 +199,8 @@ bool any_other_motion(const Image& motion, int x, int y, const F& is_so) {
   return false;
 }
 
-/// How far the pixel may show what moves otherwise near it: the largest squared difference of what the picture shows
-/// where the neighbours' motions lead from `moved`; 0 where all move alike.
+/// Error from neighbours that move differently and may be visible in the pixel, too: the largest squared difference
+/// between `moved` and the picture where their motions point; infinite if that is unknown, 0 if all move alike.
 float edge_error(const Before& before, const Image& motion, int x, int y, const Shown& moved,
                  const FeatureSlopes& slopes) {
   float most = 0;
@@ -217,7 +216,7 @@ float edge_error(const Before& before, const Image& motion, int x, int y, const 
   return most;
 }
 
-/// Means over 3 x 3 pixels, as far as they are in the image.
+/// Means over the 3 x 3 pixels that are inside the image.
 Image smoothed(const Image& image) {
   Image result(image.width, image.height, 1);
   for (int y = 0; y < image.height; ++y)

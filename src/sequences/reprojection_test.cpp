@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures that are moved by known amounts, and what must not be taken from the frame before.
+// Pictures moved by known amounts, and pixels that must not be taken from the previous frame.
 #include "sequences/reprojection.h"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ Image constant(float value) {
   return image_of(1, [=](int, int, int) { return value; });
 }
 
-/// A wall at distance 5 that moves as one.
+/// A wall at distance 5 that moves rigidly.
 MotionLayers moving(float dx, float dy, float dz = 0) {
   return {constant(5), image_of(3, [=](int, int, int c) { return c == 0 ? dx : c == 1 ? dy : dz; })};
 }
@@ -58,7 +58,7 @@ TEST(Reprojection, MovesByWholeAndPartsOfPixels) {
         ASSERT_TRUE(is_known(history, x, y));
         for (int c = 0; c < 3; ++c) {
           const float error = std::abs(history.image.pixel(x, y)[c] - expected.pixel(x, y)[c]);
-          // Linear interpolation is off by up to 0.05; at crests the value is clamped to the pixels around.
+          // Linear interpolation is off by up to 0.05; at crests the value is clamped to the nearest pixels.
           EXPECT_LT(error, 0.05f);
           n += error < 0.01f;
         }
@@ -85,12 +85,12 @@ TEST(Reprojection, LeavesOutWhatWasOutOfTheFrame) {
 }
 
 TEST(Reprojection, LeavesOutWhatWasHidden) {
-  // Until now something at distance 2 stood before the right half.
+  // In the previous frame, something at distance 2 occluded the right half.
   const Image depth_before = image_of(1, [](int x, int, int) { return x < 12 ? 5.0f : 2.0f; });
   const History history = reproject(waves(0, 0), depth_before, moving(0, 0));
   EXPECT_TRUE(is_known(history, 11, 5));
   EXPECT_FALSE(is_known(history, 12, 5));
-  // The wall came nearer: its old depth is told by the motion.
+  // The wall came nearer: the motion gives its old depth.
   const History nearer = reproject(waves(0, 0), constant(7), moving(1, 0, 2));
   EXPECT_TRUE(is_known(nearer, 5, 5));
   const History other = reproject(waves(0, 0), constant(7), moving(1, 0, 1));
@@ -135,12 +135,12 @@ TEST(Reprojection, MovesSamplesByWholePixelsAndWhatThePictureTells) {
   EXPECT_EQ(rests.samples[1].data, noise.data);
 }
 
-/// Shades whose edges lay within pixels, half a pixel further on: interpolation blurs them, but albedo tells them.
+/// Shades with edges within pixels, moved by half a pixel: interpolation blurs them, but albedo locates them.
 TEST(Reprojection, FollowsFeaturesWithinAPixel) {
   const auto albedo = [](float shift) {
     return image_of(3, [=](int x, int y, int) {
       const float at = (static_cast<float>(x) + shift) / 3;
-      const float part = std::clamp(3 * (at - std::floor(at)), 0.0f, 1.0f);  // of the pixel, box-filtered
+      const float part = std::clamp(3 * (at - std::floor(at)), 0.0f, 1.0f);  // box-filtered coverage
       const auto shade = [&](float column) {
         return 0.5f + 0.05f * std::fmod(column + 4 + static_cast<float>(y / 3), 4.0f);
       };

@@ -15,13 +15,13 @@ enum class FrameSeeds { kOwn, kSame };
 struct SequenceSettings {
   std::string camera_path;  ///< JSON file (plans/camera_path.h); empty: the camera stands still
   std::optional<FrameRange> frames;
-  double frames_per_second = 0;  ///< frame n is at the time n / this; 0: as the camera path says, or 1
+  double frames_per_second = 0;  ///< frame n is at time n / this; 0: that of the camera path, or 1
   FrameSeeds seeds = FrameSeeds::kOwn;
-  bool history = false;  ///< previous frames are mixed in
+  bool history = false;  ///< mix in previous frames
 
   bool is_sequence() const { return frames.has_value(); }
-  /// The seed of a frame, given the command's `seed`: no two frames share one, nor do frames of commands whose seeds
-  /// are below 1,000,000.
+  /// The seed of a frame, given the command's `seed`. With kOwn, those of all frames of all commands with seeds below
+  /// 1,000,000 are distinct.
   uint64_t seed_of(uint64_t seed, int frame) const {
     return seeds == FrameSeeds::kSame ? seed : seed + static_cast<uint64_t>(frame) * 1'000'000;
   }
