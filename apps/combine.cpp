@@ -61,7 +61,7 @@ void write(const CombineOptions& o, const CombineRequest& request, CombinedImage
                                                    {"covary:command", command_line()}};
   const double crn = request.crn ? request.crn->samples : 0, independent = request.independent.samples;
   if ((crn > 0 || !request.crn) && independent > 0) attributes["covary:samples"] = fmt::to_string(crn + independent);
-  if (!o.error) combined.image.std_error = {}, combined.image.bias = {};  // only requested by --json
+  if (!o.error) combined.image.std_error = {}, combined.image.bias = {};  // were needed for --json only
   write_result(o.output, request.independent.origin.place, attributes, combined.image, combined.layers);
 }
 
@@ -79,7 +79,8 @@ void check_explain(const CombineOptions& o, const Estimator& estimator, const Gr
                             o.explain->y, window.width, window.height, window.x, window.y));
 }
 
-/// The parts of one pixel: f, and for each control variate its place, coefficients, CRN mean and independent mean.
+/// The terms of one pixel's estimate: f, and for each control variate its pixel, coefficients, CRN mean and independent
+/// mean.
 nlohmann::ordered_json explain(const CombineOptions& o, const CombineRequest& request) {
   const CropWindow& window = request.independent.origin.place.window;
   const int x = o.explain->x - window.x, y = o.explain->y - window.y;
@@ -138,7 +139,7 @@ GuideImages read_guides(const CombineOptions& o, const Estimator& estimator, con
   if (!estimator.reads_guides)
     throw Error(ErrorCode::kUsage, "--guides is an option of --denoise auto, bias, balanced and error");
   const ImageInfo info = inspect_image(o.guides);
-  const auto own = [&](const char* name) -> std::optional<Image> {  // own films' as `render` itself has them
+  const auto own = [&](const char* name) -> std::optional<Image> {  // guides that `render` wrote
     const bool is_there = std::any_of(info.channels.begin(), info.channels.end(),
                                       [&](const auto& c) { return c.name.starts_with(std::string(name) + "."); });
     return is_there ? std::optional(named_guide(o.guides, info, name)) : std::nullopt;
@@ -162,7 +163,7 @@ GuideImages read_guides(const CombineOptions& o, const Estimator& estimator, con
   return guides;
 }
 
-/// A file used twice would be its own control variate, or a group without new information.
+/// Throws Error(kUsage) if a file is used twice: it would be its own control variate, or add no information.
 void check_distinct(const CombineOptions& o) {
   std::vector<std::pair<const char*, std::string>> files;
   for (const std::string& path : o.crn) files.emplace_back("--crn", path);
@@ -188,9 +189,9 @@ void check_files_of_command(const CombineOptions& o) {
   outputs.writes("--json", o.json, OutputKind::kText);
 }
 
-/// `path`: the file with the independent image's counts; empty: does nothing. All pixels of the CRN image (may be null)
-/// have `crn_samples`, or the mean according to its files. Throws Error(kUsage) if neither is known, and like
-/// GroupedFile::take_counts().
+/// Reads the independent image's sample counts from the file `path`; does nothing if it is empty. All pixels of the CRN
+/// image (may be null) have `crn_samples`, or the mean count in its files. Throws Error(kUsage) if neither is known,
+/// and like GroupedFile::take_counts().
 void take_counts(const std::string& path, std::optional<int> crn_samples, GroupedFile* crn, GroupedFile& independent) {
   if (path.empty()) return;
   independent.take_counts(path);
@@ -201,7 +202,7 @@ void take_counts(const std::string& path, std::optional<int> crn_samples, Groupe
   crn->take_count(static_cast<uint32_t>(samples));
 }
 
-/// The inputs of the command, and the files they are read from.
+/// The inputs of the command and the files they come from.
 struct Inputs {
   std::optional<GroupedFile> crn;
   GroupedFile independent;
@@ -279,7 +280,7 @@ void write_stages(const CombineOptions& o, const CombineRequest& request) {
               request.settings, request.independent.origin.place);
 }
 
-/// Without a CRN image, the mean of the independent one is denoised.
+/// Without a CRN image, the only use is to denoise the independent image's mean. Throws Error(kUsage) otherwise.
 void check_passes(CombineOptions& o) {
   if (!o.crn.empty()) return;
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
