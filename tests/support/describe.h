@@ -14,7 +14,7 @@
 
 namespace covary::test_support {
 
-/// Hands out objects made beforehand (by description), and finds files by their path.
+/// Returns objects made beforehand, by description, and finds files by path.
 class GivenObjects final : public ObjectFactory {
  public:
   explicit GivenObjects(Diagnostics& diagnostics) : diagnostics_(diagnostics) {}
@@ -29,7 +29,7 @@ class GivenObjects final : public ObjectFactory {
     diagnostics_.error(where, "file '" + name + "' does not exist");
     return std::nullopt;
   }
-  /// A parameter value that stands for `object`, as if nested in the scene file with the tag `kind`.
+  /// A parameter value for `object`, as if nested in the scene file with the tag `kind`.
   Value nest(const std::string& kind, std::shared_ptr<const SceneObject> object) {
     auto description = std::make_shared<ObjectDescription>();
     description->kind = kind, description->type = "given";
@@ -51,7 +51,7 @@ struct Made {
 
 using NamedValues = std::vector<std::pair<std::string, Value>>;
 
-/// Makes the plugin `type` of `plugins` from `values`. Parameter i stands in line i + 2 of "test.xml".
+/// Makes the plugin `type` of `plugins` from `values`. Errors place parameter i in line i + 2 of "test.xml".
 template <typename T, typename Plugins>
 Made<T> make_plugin(const Plugins& plugins, const std::string& kind, const std::string& type, const NamedValues& values,
                     GivenObjects& objects, Diagnostics& diagnostics) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of one test alone, and the messages of errors.
+// Temporary files of a test, and checks of error messages.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -36,15 +36,14 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-/// A folder that only the running test of this process uses; empty at first use, removed when the process ends.
+/// The folder of the running test in this process; empty at first use, removed when the process ends.
 inline const std::filesystem::path& test_folder() {
   static std::map<const ::testing::TestInfo*, TemporaryFolder> folders;
   return folders[::testing::UnitTest::GetInstance()->current_test_info()].path();
 }
 inline std::string test_file(const std::string& name) { return (test_folder() / name).string(); }
 
-/// The message of the Error that `call` throws, which must have the code where one is given; "no error" when it throws
-/// none.
+/// The message of the Error that `call` throws, which must have `code` if given; "no error" if none is thrown.
 template <typename Call>
 std::string message_of(Call&& call, std::optional<ErrorCode> code = {}) {
   try {
@@ -56,7 +55,7 @@ std::string message_of(Call&& call, std::optional<ErrorCode> code = {}) {
   return "no error";
 }
 
-/// Whether `text` contains `part`; says both when not.
+/// Whether `text` contains `part`; prints both if not.
 inline ::testing::AssertionResult contains(const std::string& text, const std::string& part) {
   if (text.find(part) != std::string::npos) return ::testing::AssertionSuccess();
   return ::testing::AssertionFailure() << "'" << part << "' is not in '" << text << "'";

@@ -15,13 +15,13 @@
 
 namespace covary::test_support {
 
-/// While it lives, what this thread allocates is not counted as a leak: for those of other libraries that
-/// scripts/sanitizers/leaks.txt cannot name, because the stack through them is not known.
+/// During its lifetime, LeakSanitizer ignores what this thread allocates: for leaks of other libraries that
+/// scripts/sanitizers/leaks.txt cannot suppress, because their stack frames are unknown.
 #ifdef COVARY_COUNTS_LEAKS
 using LeaksOfOthers = __lsan::ScopedDisabler;
 #else
 struct LeaksOfOthers {
-  LeaksOfOthers() {}  // not trivial, so that nothing is unused
+  LeaksOfOthers() {}  // not trivial, to avoid warnings of unused variables
 };
 #endif
 

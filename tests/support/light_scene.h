@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A scene with a single emissive shape, and checks that every emitter must pass.
+// A scene with a single emissive shape, and checks for every emitter.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -42,8 +42,8 @@ class LightScene {
   std::unique_ptr<Scene> scene_;
 };
 
-/// Mean of `value(random)` over n samples against `expected`, by a z-test with the sample's own variance. With the
-/// default n = 200 000 and alpha = 5e-7 it finds a bias of 1.6 % of the standard deviation with power 0.99.
+/// z-test of the mean of `value(random)` over n samples against `expected`, with the sample variance. With the default
+/// n = 200 000 and alpha = 5e-7 it detects a bias of 1.6 % of the standard deviation with power 0.99.
 template <typename Value>
 statistics::TestResult mean_test(const Value& value, double expected, int n = 200000, double slack = 0) {
   statistics::Moments moments;
@@ -62,15 +62,15 @@ inline EmissionSample draw_emission(const Emitter& emitter, const PathRandom& ra
                                  random.get_1d(0, Event::kLightPrimitive));
 }
 
-/// Irradiance at `reference` on a surface with unit normal `n`, as one sample of sample_towards() estimates it.
+/// One-sample estimate, by sample_towards(), of the irradiance at `reference` on a surface with unit normal `n`.
 inline double irradiance_estimate(const Emitter& emitter, const Vec3& reference, const Vec3& n,
                                   const PathRandom& random) {
   const EmitterSample s = draw_towards(emitter, reference, random);
   return s.pdf_solid_angle > 0 ? luminance(s.radiance) * std::max(0.0f, dot(s.wi, n)) / s.pdf_solid_angle : 0;
 }
 
-/// The power that one sample of sample_emission() estimates. `cosine`: radiance leaves a surface, so that the cosine at
-/// it counts.
+/// One-sample estimate, by sample_emission(), of the power. `cosine`: include the cosine at the light, for radiance
+/// that leaves a surface.
 inline double power_estimate(const Emitter& emitter, bool cosine, const PathRandom& random) {
   const EmissionSample s = draw_emission(emitter, random);
   if (!(s.pdf_position > 0 && s.pdf_direction > 0)) return 0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A small integrator that traces light, for tests of the code around light tracing. Weights do not depend on the path:
-// camera samples are those of `path` times 1 - share; light paths are connected to the lens at each vertex and weighted
-// by `share`. So the image equals that of `path` if light paths find everything: pinholes, no mirrors in view, area and
+// A small light tracer for tests of the code around light tracing. Weights do not depend on the path: camera samples
+// are those of `path` times 1 - share; light paths are connected to the lens at each vertex and weighted by `share`. So
+// the expected image is that of `path` if light paths find everything: a pinhole camera, no mirrors in view, area and
 // point lights. Slow and simple, one path at a time.
 #pragma once
 
@@ -14,7 +14,7 @@
 
 namespace covary::test_support {
 
-/// A scene of a diffuse corner with a lamp, a point light and a ball, the camera looking along +z.
+/// A diffuse corner with an area light, a point light and a sphere; the camera looks along +z.
 inline std::string corner_text(int width, int height, const std::string& rfilter,
                                const std::string& type = "perspective", const std::string& sensor = "") {
   return "<scene version='3.0.0'><integrator type='path'/><sensor type='" + type + "'>" + sensor +
@@ -36,7 +36,7 @@ inline std::string corner_text(int width, int height, const std::string& rfilter
 
 class LightTracer final : public LightTracingIntegrator {
  public:
-  /// lengths.max_depth should be small: there is no roulette for light paths.
+  /// lengths.max_depth should be small: light paths have no Russian roulette.
   LightTracer(const LightTracingSettings& settings, const PathLengthSettings& lengths, float share)
       : LightTracingIntegrator(settings), path_("path", lengths), longest_(lengths.max_depth), share_(share) {}
 
@@ -105,7 +105,7 @@ class LightTracer final : public LightTracingIntegrator {
     }
   }
 
-  /// Joins a vertex to the lens: `f` of the direction to it.
+  /// Connects a vertex to the lens; `f` is called with the direction to it.
   template <typename F>
   void add(const Join& join, uint32_t vertex, int edges, const Vec3& p, const Vec3& ng, const Spectrum& throughput,
            const F& f) const {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reflectance models for tests, made from dictionaries like those of Mitsuba's load_dict:
+// BSDFs for tests, made from dictionaries like those of Mitsuba's load_dict:
 //     make_bsdf({{"type", "plastic"}, {"int_ior", 1.9}, {"diffuse_reflectance", rgb(0.1, 0.2, 0.3)}})
-// A dictionary with a type that no reflectance model has is a texture; textures are given by the name of their type.
+// A dictionary whose type is not that of a BSDF is a texture; textures are given by the name of their type.
 #pragma once
 
 #include <filesystem>
@@ -49,7 +49,7 @@ inline ObjectPtr describe(const Json& dictionary) {
   return object;
 }
 
-/// Makes nested models by the registry and hands out given textures by type name.
+/// Makes nested BSDFs through the registry and returns given textures by type name.
 class TestFactory final : public ObjectFactory {
  public:
   TestFactory(std::map<std::string, TexturePtr> textures, Diagnostics& diagnostics)
@@ -71,7 +71,7 @@ class TestFactory final : public ObjectFactory {
   Diagnostics& diagnostics_;
 };
 
-/// Throws Error with all messages when the dictionary is wrong.
+/// Throws Error with all messages if the dictionary is invalid.
 inline BsdfPtr make_bsdf(const Json& dictionary, std::map<std::string, TexturePtr> textures = {}) {
   Diagnostics diagnostics;
   TestFactory factory(std::move(textures), diagnostics);
@@ -80,7 +80,7 @@ inline BsdfPtr make_bsdf(const Json& dictionary, std::map<std::string, TexturePt
   return bsdf;
 }
 
-/// The text of the errors that make_bsdf throws, "" when there are none.
+/// The messages of the errors that make_bsdf() throws; "" if there are none.
 inline std::string bsdf_errors(const Json& dictionary, std::map<std::string, TexturePtr> textures = {}) {
   try {
     make_bsdf(dictionary, std::move(textures));
@@ -90,7 +90,7 @@ inline std::string bsdf_errors(const Json& dictionary, std::map<std::string, Tex
   return "";
 }
 
-/// A point with the shading frame of the axes and unit tangents along them.
+/// A hit whose shading frame and unit tangents are the coordinate axes.
 inline SurfaceHit flat_hit() {
   SurfaceHit hit;
   hit.ng = {0, 0, 1};

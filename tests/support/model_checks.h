@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the tests of the reflectance models share: each check binds a model made from a dictionary at flat_hit() and
-// looks at it from several directions.
+// Shared checks of BSDFs: each binds a BSDF made from a dictionary at flat_hit() and evaluates it from several
+// directions.
 //
 // Statistical checks: N = 100 000 samples in 64 cells, alpha = 5e-7 for each comparison; they detect, with power 0.99,
-// a density wrong by 3.4 % rms, and a total mass wrong by 0.15 % where no sample fails (statistics/chi2.h), and a
-// lobe's probability wrong by 1.2 percentage points. Seed fixed.
+// a density wrong by 3.4 % rms, and a total mass wrong by 0.15 % if no sample fails (statistics/chi2.h), and a lobe's
+// probability wrong by 1.2 percentage points. The seed is fixed.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ inline Vec3 direction(float theta, float phi) {
   return {std::sin(t) * std::cos(phi), std::sin(t) * std::sin(phi), std::cos(t)};
 }
 
-/// A model bound at flat_hit() for one outgoing direction.
+/// A BSDF bound at flat_hit() for one outgoing direction.
 class Bound {
  public:
   Bound(const Json& dictionary, const Vec3& wo, TransportMode mode = TransportMode::kRadiance, Textures textures = {})
@@ -44,13 +44,13 @@ class Bound {
   const BsdfClosure* closure_;
 };
 
-/// A closure with a mistake in it, which the checks must find.
+/// A closure with a planted bug, which the checks must detect.
 class Planted final : public BsdfClosure {
  public:
   enum class Bug {
     kDensity,  ///< all smooth densities 2 % too high
-    kReuse,    ///< one number for the lobe and for the direction
-    kPmf,      ///< the probability of lobe 0 understated by 3 %, weights made to match
+    kReuse,    ///< one random number for both the lobe and the direction
+    kPmf,      ///< the probability of lobe 0 understated by 3 %, with weights to match
   };
   Planted(const BsdfClosure& right, Bug bug) : right_(right), bug_(bug) {}
 
@@ -85,7 +85,7 @@ class Planted final : public BsdfClosure {
   Bug bug_;
 };
 
-/// Everything check_closure checks, from each of `thetas`, for radiance and importance.
+/// All checks of check_closure(), from each of `thetas` (degrees), for radiance and importance.
 inline void expect_sound(const Json& dictionary, const std::vector<float>& thetas, const Textures& textures = {}) {
   for (const float theta : thetas) {
     const TransportMode mode = theta < 50 ? TransportMode::kRadiance : TransportMode::kImportance;
@@ -97,7 +97,7 @@ inline void expect_sound(const Json& dictionary, const std::vector<float>& theta
   }
 }
 
-/// The counterpart of expect_sound: a model with a planted bug is rejected.
+/// The counterpart of expect_sound(): a BSDF with a planted bug is rejected.
 inline void expect_rejected(const Json& dictionary, Planted::Bug bug, float theta = 40, const Textures& textures = {}) {
   const Vec3 wo = direction(theta, 0.7f);
   const Bound closure(dictionary, wo, TransportMode::kRadiance, textures);
@@ -105,8 +105,8 @@ inline void expect_rejected(const Json& dictionary, Planted::Bug bug, float thet
       << dictionary.dump() << ": bug " << static_cast<int>(bug) << " was not found";
 }
 
-/// Importance is the adjoint of radiance, f*(wo, wi) = f(wi, wo), for smooth lobes and directions drawn by the model;
-/// for models that do not look at the mode this is reciprocity. Returns the number of pairs with a value.
+/// Importance is the adjoint of radiance, f*(wo, wi) = f(wi, wo), for smooth lobes and sampled directions; for BSDFs
+/// that ignore the transport mode, this is reciprocity. Returns the number of pairs with a non-zero value.
 inline int expect_adjoint(const Json& dictionary, const std::vector<float>& thetas, const Textures& textures = {},
                           float tolerance = 2e-3f) {
   int n_pairs = 0;
@@ -131,7 +131,7 @@ inline int expect_adjoint(const Json& dictionary, const std::vector<float>& thet
 }
 
 /// The directional albedo of all lobes, the mean weight of N = 100 000 samples, lies in [least, most]. alpha = 5e-7
-/// (five standard deviations of the mean); with weights of standard deviation sigma it detects 7.4 sigma / 316 with
+/// (five standard deviations of the mean); for weights with standard deviation sigma, it detects 7.4 sigma / 316 with
 /// power 0.99.
 inline void expect_albedo_within(const Json& dictionary, float theta, double least, double most,
                                  TransportMode mode = TransportMode::kRadiance, const Textures& textures = {}) {

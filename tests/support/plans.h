@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Small scenes and quick plans.
+// Small scenes and plans that run quickly.
 #pragma once
 
 #include <atomic>
@@ -12,7 +12,7 @@
 
 namespace covary {
 
-/// The scene at `path` in another size, with its own integrator.
+/// The scene at `path` with another film size and its own integrator.
 inline LoadedScene load_sized(const std::string& path, int width = 40, int height = 30) {
   LoadOptions options;
   options.width = width, options.height = height;
@@ -27,7 +27,7 @@ inline RenderRequest request_of(uint32_t spp) {
   return request;
 }
 
-/// CRN and independent pass; the image is the average of the first groups of both.
+/// A CRN and an independent pass; the image is the average of the first group of each.
 inline Plan average_plan() {
   Estimator method;
   method.name = method.text = "average";

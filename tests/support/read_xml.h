@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mitsuba XML read from text, with all errors, for tests of the reader.
+// Reads Mitsuba XML from text and collects all errors, for tests of the reader.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@
 
 namespace covary::test_support {
 
-/// A scene read from text, with all errors in `errors`.
+/// A scene read from text, with all errors.
 struct Read {
   SceneXml xml;
   std::string errors;

@@ -11,7 +11,7 @@ namespace covary::test_support {
 
 inline double difference(const Vec3& a, const Vec3& b) { return length(a - b); }
 
-/// Both scenes look the same along all rays of a grid on the film, and have lights of the same power.
+/// Both scenes have the same hits and BSDF values along a grid of camera rays, and lights of the same power.
 inline void expect_same_scene(const LoadedScene& a, const LoadedScene& b, int least_hits) {
   ASSERT_EQ(a.width, b.width);
   ASSERT_EQ(a.height, b.height);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tensor files for tests, as strings; bsdfs/tensor_file.h has the format.
+// Tensor files for tests, as strings (format: bsdfs/tensor_file.h).
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace covary::test_support {
 
-/// One field: its values as they lie in the file.
+/// A field with its values in the file's order.
 struct TensorField {
   std::string name;
   std::vector<uint64_t> shape;

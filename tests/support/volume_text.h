@@ -8,7 +8,7 @@
 
 namespace covary::test_support {
 
-/// The bytes of a volume file of nx x ny x nz cells over the box [-1, 1]³.
+/// The bytes of a Mitsuba volume file with nx x ny x nz cells over the box [-1, 1]³.
 inline std::string volume_text(int nx, int ny, int nz, int channels, const std::vector<float>& values) {
   std::string text = "VOL\x03";
   const auto append = [&](const auto& value) { text.append(reinterpret_cast<const char*>(&value), sizeof(value)); };
