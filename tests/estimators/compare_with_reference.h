@@ -12,7 +12,7 @@
 
 namespace covary::reference {
 
-/// The neighbours of all pixels (neighbours_test shows that they are the right ones).
+/// The neighbours of all pixels (neighbours_test checks them).
 inline std::vector<std::vector<Pixel>> neighbours(const GroupedImage& crn, int k, int window, bool include_target) {
   const std::vector<unsigned char> valid(static_cast<size_t>(crn.width) * crn.height, 1);
   const Planes guide = moments(crn, valid, window / 2, kFar).mean;
@@ -32,8 +32,8 @@ inline std::vector<std::vector<Pixel>> neighbours(const GroupedImage& crn, int k
   return result;
 }
 
-/// Largest difference from the reference, in standard deviations of the CRN mean and the light that it lacks, of
-/// estimate and standard error.
+/// Largest differences of the estimate and the standard error from the reference, in units of the standard deviation of
+/// the CRN mean and its missing light.
 struct Difference {
   double estimate = 0, std_error = 0;
 };
@@ -62,7 +62,7 @@ inline Difference compare(const EstimatorResult& fast, const GroupedImage& crn, 
   return worst;
 }
 
-/// The pilot penalty of all pixels of the independent image.
+/// The pilot error of all pixels of the independent image.
 inline RgbImage pilot_of(const GroupedImage& crn, const GroupedImage& independent, int window) {
   return pilot_error(crn, map_pixels(independent, [&](int x, int y) { return mean(independent, x, y); }), window,
                      independent);

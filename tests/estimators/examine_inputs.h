@@ -5,7 +5,7 @@
 
 namespace covary {
 
-/// The report on whole images.
+/// InputChecks for whole images.
 inline InputReport examine_inputs(const GroupedImage& crn, const GroupedImage& independent) {
   InputChecks checks(crn.width, crn.height, crn.groups, independent.groups);
   checks.add_rows(crn, independent);

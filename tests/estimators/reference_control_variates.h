@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The image-space control variates of Yang & Moon 2025 as written in the paper, in double precision, one pixel at a
-// time, with no regard for speed. Eq. numbers are the paper's.
+// time, without regard for speed. Equation numbers are the paper's.
 #pragma once
 
 #include <Eigen/Dense>
@@ -18,7 +18,7 @@ struct Pixel {
 using Rgb = std::array<double, 3>;
 using RgbImage = std::vector<Rgb>;
 
-/// Size of a group.
+/// Number of samples in group t.
 inline double size(const GroupedImage& image, int x, int y, int t) {
   const double N = image.count(x, y);
   return std::ceil((N - t) / image.groups);
@@ -62,8 +62,8 @@ RgbImage map_pixels(const GroupedImage& image, const Function& function) {
   return result;
 }
 
-/// Cross-bilateral mean of `values` at (x, y), guided by the CRN image; the weights of Eq. (11), times the counts of
-/// the image that values are of.
+/// Cross-bilateral mean of `values` at (x, y), guided by the CRN image: the weights of Eq. (11) times the sample counts
+/// of `counted`, if it has any.
 inline Rgb guided_mean(const GroupedImage& crn, const RgbImage& values, int window, int x, int y,
                        const GroupedImage& counted = {}) {
   const int r = window / 2;
@@ -82,7 +82,7 @@ inline Rgb guided_mean(const GroupedImage& crn, const RgbImage& values, int wind
   return sum;
 }
 
-/// Eq. (11) for the mean image `h`, of `counted` where that has counts.
+/// Eq. (11) for the mean image `h`, with the sample counts of `counted` if it has any.
 inline RgbImage pilot_error(const GroupedImage& crn, const RgbImage& h, int window, const GroupedImage& counted = {}) {
   return map_pixels(crn, [&](int x, int y) {
     Rgb e = guided_mean(crn, h, window, x, y, counted);
@@ -91,7 +91,7 @@ inline RgbImage pilot_error(const GroupedImage& crn, const RgbImage& h, int wind
   });
 }
 
-/// What the CRN image lacks: missing_light.h.
+/// The light that the CRN image misses (missing_light.h).
 inline RgbImage missing_light(const GroupedImage& crn, const GroupedImage& independent) {
   const int r = 5;
   struct Of {
@@ -137,17 +137,17 @@ inline RgbImage missing_light(const GroupedImage& crn, const GroupedImage& indep
 struct Settings {
   bool shared = true, symmetric = true;
   double ridge = 0;             ///< > 0: replaces the errors of h
-  double smallest_penalty = 0;  ///< relative to the variance of the CRN groups
-  double mean_constraint = 0;      ///< weight of the condition sum beta g = f, relative to the noise
-  double sample_fraction = 0;      ///< part of the penalty that is the variance of h
+  double smallest_penalty = 0;  ///< lower bound, relative to the variance of the CRN groups
+  double mean_constraint = 0;   ///< weight of the condition sum beta g = f, relative to the noise
+  double sample_fraction = 0;   ///< part of the penalty that is the variance of h
 };
 
 struct Result {
   Rgb estimate, std_error;
 };
 
-/// Eqs. (7), (8), (10) at `target` with the given neighbours. `error_of_h`: per pixel, of the mean. `missing`:
-/// missing_light(), or none.
+/// Eqs. (7), (8), (10) at `target` with the given neighbours. `error_of_h`: squared error of h per pixel. `missing`:
+/// missing_light(), or empty.
 inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const RgbImage& error_of_h,
                                const RgbImage& variance_of_h, Pixel target, const std::vector<Pixel>& neighbours,
                                const Settings& s, const RgbImage& missing = {}) {
@@ -158,7 +158,7 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
   for (int c = 0; c < 3; ++c) {
     X[c].resize(T, k);
     y[c].resize(T);
-    // Rows of equal variance.
+    // Rows scaled to equal variance.
     const auto centred = [&](Pixel p, int t) {
       const double weight = size(crn, p.x, p.y, t) * T / crn.count(p.x, p.y);
       return std::sqrt(weight) * (crn.pixel(p.x, p.y)[3 * t + c] - mean(crn, p.x, p.y)[c]);
@@ -168,8 +168,8 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
       for (int i = 0; i < k; ++i) X[c](t, i) = centred(neighbours[i], t);
     }
   }
-  // V_h for the groups: a group mean has T times the variance of the mean. It is not taken to be smaller than a small
-  // part of the variance of the CRN groups.
+  // V_h of the groups: a group mean has T times the variance of the mean. Its lower bound is a small fraction of the
+  // variance of the CRN groups.
   const auto group_variance = [&](Pixel p, int c) { return T * variance_of_mean(crn, p.x, p.y)[c]; };
   const auto lacks = [&](Pixel p, int c) { return missing.empty() ? 0.0 : missing[index(p)][c]; };
   const auto light = [&](Pixel p, int c) { return mean(crn, p.x, p.y)[c] + lacks(p, c); };
@@ -195,7 +195,7 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
     if (s.ridge > 0) V.setConstant(s.ridge * mean_diagonal);
     return V;
   };
-  // Eq. (10); shared coefficients stack the rows of the channels.
+  // Eq. (10); for shared coefficients, the rows of the channels are stacked.
   std::array<Eigen::VectorXd, 3> beta;
   std::array<double, 3> left;  // 1 - degrees of freedom of the fit / degrees of freedom of the groups
   for (int c = 0; c < (s.shared ? 1 : 3); ++c) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Input-dependent uncorrelated weighting (Back et al. 2023) as a plain double-precision loop; see estimators/iduw.h.
+// Input-dependent uncorrelated weighting (Back et al. 2023; estimators/iduw.h) as a plain double-precision loop.
 #pragma once
 
 #include "estimators/reference_control_variates.h"
@@ -16,8 +16,8 @@ struct Iduw {
   const GroupedImage &crn, &independent;
   int window, samples;
 
-  /// y + 1 / (W - 1) sum w ((z_c - z_i) - (y_c - y_i)) with y, z the means of the groups first, first + step, …, and
-  /// the weights from the groups a, a + a_step, … and b, b + a_step, …
+  /// y + 1 / (W - 1) sum w ((z_c - z_i) - (y_c - y_i)) with the means y, z of the groups first, first + step, … and
+  /// weights from the groups a, a + ab_step, … and b, b + ab_step, …
   double at(int x, int y, int c, double gamma, int first, int step, int a, int b, int ab_step) const {
     double sum = 0;
     for (int dy = -window / 2; dy <= window / 2; ++dy)
@@ -27,7 +27,7 @@ struct Iduw {
           return mean(image, x, y, t0, s)[c] - mean(image, qx, qy, t0, s)[c];
         };
         const double d = change(crn, a, ab_step) - change(crn, b, ab_step);
-        // The target itself contributes zero.
+        // The target pixel contributes zero.
         sum += std::exp(-gamma * samples * d * d) * (change(crn, first, step) - change(independent, first, step));
       }
     return mean(independent, x, y, first, step)[c] + sum / (window * window - 1);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Polynomial control variates as their formula is written: raw monomials and their integrals over the unit cube, least
-// squares with an intercept by a rank-revealing QR factorisation, in double precision, with no regard for speed.
+// squares with an intercept by a rank-revealing QR factorisation, in double precision, without regard for speed.
 #pragma once
 
 #include <Eigen/Dense>
@@ -35,7 +35,7 @@ inline double monomial(const std::vector<int>& exponents, const float* u) {
   return value;
 }
 
-/// Integral over [0, 1]^d.
+/// Integral of a monomial over [0, 1]^d.
 inline double integral(const std::vector<int>& exponents) {
   double value = 1;
   for (int e : exponents) value /= e + 1;

@@ -6,7 +6,7 @@
 
 namespace covary::reference {
 
-/// Weighted mean of h - F^ over cells of side x side pixels that are like F^ at (x, y), and its variance.
+/// Weighted mean of h - F^ over cells of side x side pixels whose F^ is similar to that at (x, y), and its variance.
 struct GuidedMean {
   Rgb value{};
   double variance = 0;
@@ -41,8 +41,8 @@ inline GuidedMean guided_mean(const RgbImage& estimate, const RgbImage& h, const
   return {{sum[0] / weights, sum[1] / weights, sum[2] / weights}, squares / (weights * weights)};
 }
 
-/// Twice F^ + means of h - F^: first with bandwidths kappa and 4 kappa, then with 12 kappa; weighted by the counts of
-/// the image that h is of, where it has any.
+/// Two steps of F^ + means of h - F^: with bandwidths kappa and 4 kappa, then with 12 kappa; weighted by the sample
+/// counts of h's image, if it has any.
 inline RgbImage residual_correction(const RgbImage& estimate, const RgbImage& std_error, const RgbImage& h,
                                     const RgbImage& variance_of_h, int width, int height, int window, double kappa,
                                     const GroupedImage& counted = {}) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Synthetic grouped images for tests: a smooth picture with an edge, CRN noise shared by all pixels up to a part of
-// their own, independent noise, and rare bright outliers.
+// Synthetic grouped images for tests: a smooth picture with an edge, and noise that is shared by all pixels (CRN) up to
+// a fraction of their own, or independent, with rare bright outliers.
 #pragma once
 
 #include <cmath>
@@ -14,7 +14,7 @@ namespace covary::test {
 struct Grouped {
   int width, height, groups;
   std::vector<float> data;
-  std::vector<uint32_t> counts = {};  // empty: the same everywhere
+  std::vector<uint32_t> counts = {};  // empty: equal for all pixels
   GroupedImage view() const { return {width, height, groups, data.data(), counts.empty() ? nullptr : counts.data()}; }
   float* pixel(int x, int y) { return data.data() + (static_cast<size_t>(y) * width + x) * groups * 3; }
 };
@@ -23,18 +23,19 @@ inline Grouped constant_image(int width, int height, int groups, float value) {
   return {width, height, groups, std::vector<float>(static_cast<size_t>(width) * height * groups * 3, value)};
 }
 
-/// Expected value of the picture.
+/// Expected value of the picture, without outliers.
 inline double expected(int x, int y, int c) {
   const double smooth = 1.0 + 0.5 * std::sin(0.21 * x + c) * std::cos(0.17 * y);
   return (x + y > 45 ? 0.3 : 1.0) * smooth * (1.0 + 0.2 * c);
 }
 
-/// Uniform in [-1/2, 1/2).
+/// Hash noise, uniform in [-1/2, 1/2).
 inline float noise(uint64_t seed, uint64_t a, uint64_t b) {
   return static_cast<float>(mix64(combine64(combine64(seed, a), b)) >> 40) * 0x1p-24f - 0.5f;
 }
 
-/// `own`: part of the noise that is not shared by the pixels; 1 makes an independent image.
+/// `own`: fraction of the noise that pixels do not share; 1 makes an independent image. Outliers, of relative frequency
+/// `outliers` times `own`, add five times the expected value.
 inline Grouped noisy_image(int width, int height, int groups, uint64_t seed, float own, float outliers = 0.01f) {
   Grouped image = constant_image(width, height, groups, 0);
   for (int y = 0; y < height; ++y)
