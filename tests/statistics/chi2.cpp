@@ -32,13 +32,13 @@ using SquareDensity = std::function<double(double, double)>;
 
 struct Rule {
   double integral;
-  bool edge;  ///< the integrand vanishes at some nodes and not at others: its support may end inside the box
+  bool edge;  ///< the integrand is zero at some nodes only: its support may end inside the box
 };
 
-/// Tensor product of the 5-point Gauss-Lobatto rule, whose nodes reach to the rim of the box, where the support of a
+/// Tensor product of the 5-point Gauss-Lobatto rule, whose nodes reach the rim of the box, where the support of a
 /// density often ends.
 Rule lobatto(const SquareDensity& f, const Box& b) {
-  static constexpr double kRim = 1 - 1e-6;  // not on it: two boxes share it, and a horizon belongs to neither side
+  static constexpr double kRim = 1 - 1e-6;  // not 1: two boxes share the rim, which may be a horizon
   static constexpr std::array<double, 5> kNodes{-kRim, -0.6546536707079771, 0, 0.6546536707079771, kRim};
   static constexpr std::array<double, 5> kWeights{0.1, 49.0 / 90, 32.0 / 45, 49.0 / 90, 0.1};
   const double cx = (b.x0 + b.x1) / 2, hx = (b.x1 - b.x0) / 2, cy = (b.y0 + b.y1) / 2, hy = (b.y1 - b.y0) / 2;
@@ -53,9 +53,9 @@ Rule lobatto(const SquareDensity& f, const Box& b) {
   return {sum * hx * hy, n_zeros > 0 && n_zeros < 25};
 }
 
-/// Cuts the box in four until the integral changes by less than `tolerance`, and at least 6 times around an edge. The
-/// tolerance is halved, not quartered, at each level: edges are curves, which meet twice as many boxes. The cuts are
-/// not in the middle but jittered, so that the errors along an edge parallel to the axes do not add up.
+/// Splits the box in four until the integral changes by less than `tolerance`, and at least 6 times around an edge. The
+/// tolerance is halved, not quartered, at each level, because an edge is a curve, which meets twice as many boxes.
+/// Splits are jittered about the middle, so that errors along an edge parallel to the axes do not add up.
 double integrate(const SquareDensity& f, const Box& b, const Rule& whole, double tolerance, int level) {
   const uint64_t bits = combine64(std::bit_cast<uint64_t>(b.x0 + b.x1), std::bit_cast<uint64_t>(b.y0 + b.y1));
   const double rx = 0.4 + 0.2 * (bits >> 40) * 0x1p-24, ry = 0.4 + 0.2 * (bits & 0xffffff) * 0x1p-24;
@@ -65,7 +65,7 @@ double integrate(const SquareDensity& f, const Box& b, const Rule& whole, double
   std::array<Rule, 4> values;
   double sum = 0;
   for (int i = 0; i < 4; ++i) values[i] = lobatto(f, parts[i]), sum += values[i].integral;
-  const bool converged = !(std::abs(sum - whole.integral) > tolerance);  // also when not finite
+  const bool converged = !(std::abs(sum - whole.integral) > tolerance);  // also if NaN
   if ((converged && !(whole.edge && level < 6)) || level == 9) return sum;
   sum = 0;
   for (int i = 0; i < 4; ++i) sum += integrate(f, parts[i], values[i], tolerance / 2, level + 1);
@@ -85,9 +85,9 @@ double integrate_grid(const SquareDensity& f, double tolerance, int n) {
 
 // --- Cells ---------------------------------------------------------------------------------------------------------
 
-/// Binary tree over the unit square. Its leaves hold about 50 of the points it was made from, and are where the density
-/// is integrated; subtrees that hold equally many points are the cells of the test. Space without points is cut off, so
-/// that every leaf is about as small as the details of the density in it.
+/// Binary tree over the unit square, built from points. The density is integrated over the leaves, which hold about 50
+/// points each; subtrees with equal numbers of points are the cells of the test. Empty space is cut off, so that every
+/// leaf is about as small as the details of the density in it.
 class Cells {
  public:
   struct Leaf {
@@ -95,7 +95,7 @@ class Cells {
     int cell;
   };
   Cells(std::vector<Point2> points, int n_cells) {
-    // The first cut is at y = 1/2: the horizon, where densities of directions are discontinuous.
+    // The first split is at y = 1/2, the horizon, where densities of directions are discontinuous.
     nodes_.push_back({.split = 0.5, .axis = 1, .child = 1});
     nodes_.resize(3);
     const auto middle = std::partition(points.begin(), points.end(), [](const Point2& p) { return p.y < 0.5; });
@@ -127,8 +127,8 @@ class Cells {
     const auto [x_min, x_max] = std::ranges::minmax(points, {}, &Point2::x);
     const auto [y_min, y_max] = std::ranges::minmax(points, {}, &Point2::y);
     const double dx = x_max.x - x_min.x, dy = y_max.y - y_min.y;
-    // Space without points is cut off, the farthest three quarters first, so that boxes grow with their distance. It
-    // goes to the cell it belongs to or, above the cells, makes one of its own.
+    // Cut off empty space, the farthest three quarters first, so that boxes grow with their distance. It goes to the
+    // cell that it belongs to or, above the cells, becomes a cell.
     const auto cut_off = [&](int axis, double points_end, double box_end) {
       const double split = points_end + (box_end - points_end) / 4;
       const std::span<Point2> none;
@@ -142,7 +142,7 @@ class Cells {
     if (dy > 0 && box.y1 - y_max.y > 2 * dy) return cut_off(1, y_max.y, box.y1);
     if (dy > 0 && y_min.y - box.y0 > 2 * dy) return cut_off(1, y_min.y, box.y0);
     if (points.size() < 64) return make_leaf(node, box, cell);
-    // Median cut, across the sides in turn, unless the points do not differ there.
+    // Median split, along the axes in turn, unless all points are equal there.
     const int axis = dx > 0 && (dy == 0 || depth % 2) ? 0 : 1;
     const auto middle = points.begin() + points.size() / 2;
     std::nth_element(points.begin(), middle, points.end(),
@@ -172,7 +172,7 @@ class Cells {
 
 // --- The test ------------------------------------------------------------------------------------------------------
 
-/// Folder of this process' reports; removed at the end when all tests passed (planted bugs are rejected on purpose).
+/// Folder of this process's reports; removed at the end if all tests passed (planted bugs are rejected on purpose).
 class ReportFolder {
  public:
   ReportFolder() : path_((std::filesystem::temp_directory_path() / "covary-chi2-XXXXXX").string()) {
@@ -182,7 +182,7 @@ class ReportFolder {
     std::error_code ignored;
     if (!path_.empty() && ::testing::UnitTest::GetInstance()->Passed()) std::filesystem::remove_all(path_, ignored);
   }
-  /// Path of a new report without extension; empty when there is no folder.
+  /// Path of a new report without extension; empty if there is no folder.
   std::string next(const std::string& name) {
     if (path_.empty()) return "";
     std::string file = fmt::format("{}-{}", ++n_reports_, name.substr(0, 80));
@@ -196,7 +196,7 @@ class ReportFolder {
   int n_reports_ = 0;
 };
 
-/// Writes observed and expected counts and a script that draws them; returns a sentence that names both.
+/// Writes observed and expected counts and a script that plots them; returns a sentence that names both files.
 std::string write_report(const std::string& name, const std::vector<Box>& boxes, const std::vector<double>& observed,
                          const std::vector<double>& expected) {
   static ReportFolder folder;
@@ -231,8 +231,8 @@ plt.savefig(sys.argv[0][:-3] + '.png')
   return fmt::format("\n  table: {}\n  plot:  python3 {}", csv, script);
 }
 
-/// Two independent tests: is the fraction of samples that succeed the integral of the density, and are those samples
-/// distributed like the density? The p-value combines both (Sidak).
+/// Two independent tests: whether the fraction of valid samples is the integral of the density, and whether valid
+/// samples are distributed like the density. The p-value combines both (Sidak).
 Chi2Result compare(const std::vector<Box>& boxes, const std::vector<double>& observed,
                    const std::vector<double>& expected, double n, double zero_density_samples,
                    const Chi2Options& options) {
@@ -250,7 +250,7 @@ Chi2Result compare(const std::vector<Box>& boxes, const std::vector<double>& obs
 
   double shape_p_value = 1;
   if (finite && n_expected > 0) {
-    // Cells, smallest first, so that those below 5 are pooled, together with the next larger one if they need it.
+    // Cells, smallest first, so that those with an expected count below 5 are pooled, with the next larger if needed.
     std::vector<std::pair<double, double>> cells;
     for (size_t i = 0; i < observed.size(); ++i) cells.emplace_back(expected[i] * n_observed / n_expected, observed[i]);
     std::sort(cells.begin(), cells.end());
@@ -280,7 +280,7 @@ Chi2Result compare(const std::vector<Box>& boxes, const std::vector<double>& obs
   else if (!(result.p_value >= options.alpha))
     why = "samples and density differ";
   result.accepted = why.empty();
-  if (!result.accepted && finite && n_expected > 0) {  // point at the cell with the largest contribution
+  if (!result.accepted && finite && n_expected > 0) {  // report the cell with the largest contribution
     const auto contribution = [&](size_t i) {
       return std::abs(observed[i] - expected[i]) / std::sqrt(expected[i] + 1);
     };
@@ -300,7 +300,7 @@ Chi2Result run(const SquareSampler& sample, const SquareDensity& pdf, const Chi2
   const auto draw = [&](uint32_t pass, uint64_t i) {
     return sample(PathRandom(Sampling::kIndependent, options.seed, pass, 0, i));
   };
-  std::vector<Point2> pilot;  // enough to resolve the density, also where most samples fail
+  std::vector<Point2> pilot;  // enough to resolve the density even if most samples fail
   const size_t n_wanted = 200 * static_cast<size_t>(options.n_cells);
   for (int i = 0; i < 4 * options.n_samples && pilot.size() < n_wanted; ++i)
     if (const auto p = draw(1, i)) pilot.push_back(*p);
@@ -315,7 +315,7 @@ Chi2Result run(const SquareSampler& sample, const SquareDensity& pdf, const Chi2
     ++observed[cells.find(*p)];
     if (i < options.n_samples / 8 && !(pdf(p->x, p->y) > 0)) zero_density_samples += 8;
   }
-  // Each cell's integral good to a tenth of the standard deviation of its count.
+  // Integrate each cell to a tenth of the standard deviation of its count.
   const double tolerance = 0.1 / std::sqrt(double(options.n_samples) * n_cells) * n_cells / cells.leaves().size();
   for (const Cells::Leaf& leaf : cells.leaves())
     expected[leaf.cell] += options.n_samples * integrate(pdf, leaf.box, tolerance);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Chi-square tests of goodness of fit: does a sampler draw from the density it claims?
+// Chi-square goodness-of-fit tests of samplers against the densities that they claim.
 //
-// The domain (sphere of directions or unit square) is mapped to the unit square with constant area ratio and cut into
-// about `n_cells` boxes that hold equally many of a first, independent batch of samples, so that narrow lobes are
-// resolved. The density is integrated over each box by adaptive Gauss-Lobatto quadrature; a second batch is counted.
-// Boxes with expected count below 5 are pooled. The fraction of samples that do not fail (and are not left out on
-// purpose, such as those of delta lobes) is compared with the total mass of the density.
+// The domain (sphere of directions or unit square) is mapped to the unit square by an equal-area map and split into
+// about `n_cells` boxes with equal numbers of samples of a first, independent batch, so that narrow lobes are resolved.
+// The density is integrated over each box by adaptive Gauss-Lobatto quadrature; a second batch is counted. Boxes with
+// an expected count below 5 are pooled. The fraction of samples that do not fail (and are not left out on purpose, such
+// as those of delta lobes) is compared with the total mass of the density.
 //
 // Smallest errors detected with power 0.99 at alpha = 5e-7 (non-central chi-square distribution), as rms relative error
 // of the density over the domain, and as relative error in a single cell:
@@ -28,7 +28,7 @@
 namespace covary::statistics {
 
 struct Chi2Options {
-  std::string name = "chi2";  ///< names the case in messages and files
+  std::string name = "chi2";  ///< of the case, in messages and files
   int n_samples = 400000;     ///< of the counted batch; more are drawn to place the cells
   int n_cells = 128;          ///< upper bound
   uint64_t seed = 1;
@@ -46,7 +46,7 @@ struct Chi2Result {
   std::string message = "the test was not run";
 };
 
-/// Draws one sample from numbers of `random` (use vertex 0 and any events); nullopt when sampling fails.
+/// Draws one sample with the random numbers of `random` (use vertex 0 and any events); nullopt if sampling fails.
 template <typename Point>
 using Sampler = std::function<std::optional<Point>(const PathRandom& random)>;
 template <typename Point>
@@ -56,11 +56,11 @@ using Density = std::function<double(const Point&)>;
 Chi2Result chi2_sphere(const Sampler<Vec3>& sample, const Density<Vec3>& pdf, const Chi2Options& options = {});
 /// Points of the unit square [0, 1)^2; the density is per unit area.
 Chi2Result chi2_square(const Sampler<Vec2>& sample, const Density<Vec2>& pdf, const Chi2Options& options = {});
-/// Indices 0 ... probabilities.size() - 1.
+/// Indices 0 … probabilities.size() - 1; `observed`: their counts.
 Chi2Result chi2_discrete(std::span<const double> observed, std::span<const double> probabilities,
                          const Chi2Options& options = {});
 
-/// Integral of a density over the sphere or the unit square, by the quadrature the tests use, in `n` x `n` boxes.
+/// Integral of a density over the sphere or the unit square by the tests' quadrature, in `n` x `n` boxes.
 double integrate_sphere(const Density<Vec3>& f, double tolerance = 1e-5, int n = 16);
 double integrate_square(const Density<Vec2>& f, double tolerance = 1e-5, int n = 16);
 

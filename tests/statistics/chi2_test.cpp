@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The chi-square tests must accept right samplers, reject wrong ones, and give uniform p-values.
+// The chi-square tests must accept correct samplers, reject wrong ones, and give uniform p-values.
 #include "statistics/chi2.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ double cosine_pdf(const Vec3& w) { return warp::cosine_hemisphere_pdf_solid_angl
 
 TEST(Chi2Sphere, AcceptsRightSamplers) {
   EXPECT_TRUE(chi2_sphere(cosine_sample, cosine_pdf).accepted);
-  const Chi2Result failing = chi2_sphere(  // a third fails on purpose; the density of the rest has mass 2/3
+  const Chi2Result failing = chi2_sphere(  // a third fails on purpose; the density has mass 2/3
       [](const PathRandom& random) {
         return random.get_1d(0, Event::kLobe) < 1.0f / 3 ? std::nullopt : cosine_sample(random);
       },
@@ -33,7 +33,7 @@ TEST(Chi2Sphere, AcceptsRightSamplers) {
 }
 
 TEST(Chi2Sphere, AcceptsVeryNarrowLobes) {
-  for (const float one_minus_cos : {1e-7f, 1e-4f, 0.3f}) {  // cones: the edge is a discontinuity inside the cells
+  for (const float one_minus_cos : {1e-7f, 1e-4f, 0.3f}) {  // cones: their edge is a discontinuity inside cells
     const Chi2Result result = chi2_sphere(
         [&](const PathRandom& random) {
           return std::optional(warp::square_to_cone(random.get_2d(0, Event::kDirection), one_minus_cos));
@@ -63,7 +63,7 @@ TEST(Chi2Sphere, RejectsPlantedBugs) {
       },
       [](const Vec3& w) { return cosine_pdf(w) * 1.02 * 2 / 3; });
   rejected("dropped cosine", cosine_sample, [](const Vec3& w) { return w.z > 0 ? 1 / kTwoPi : 0.0; });
-  // Half of the samples are flipped to the lower hemisphere by the number that also chose their azimuth.
+  // The random number that flips half of the samples to the lower hemisphere also chooses the azimuth.
   const Density<Vec3> two_sided = [](const Vec3& w) {
     return 0.5 * warp::cosine_hemisphere_pdf_solid_angle(std::abs(w.z));
   };
@@ -88,8 +88,8 @@ TEST(Chi2Sphere, RejectsPlantedBugs) {
   rejected("not finite", cosine_sample, [](const Vec3& w) { return w.z > 0.999 ? std::nan("") : cosine_pdf(w); });
 }
 
-// p-values of 60 seeds, N = 40 000 each: Kolmogorov-Smirnov at alpha = 1e-6 sees a deviation of 0.5 of their
-// distribution function with power 0.99. Planted bug: a density tilted by up to 6 %, less than what one run surely
+// p-values of 60 seeds, N = 40 000 each: a Kolmogorov-Smirnov test at alpha = 1e-6 detects a deviation of 0.5 in their
+// distribution function with power 0.99. Planted bug: a density tilted by up to 6 %, less than a single run reliably
 // rejects.
 TEST(Chi2Sphere, PValuesAreUniformUnderTheHypothesisOnly) {
   for (const double tilt : {0.0, 0.06}) {
@@ -106,7 +106,7 @@ TEST(Chi2Sphere, PValuesAreUniformUnderTheHypothesisOnly) {
 }
 
 TEST(Chi2Square, AcceptsAndRejects) {
-  // Density 2x by the square root; planted bug: the root is forgotten.
+  // Density 2x, sampled by a square root; planted bug: the root is omitted.
   const Density<Vec2> pdf = [](const Vec2& p) { return 2 * p.x; };
   const Chi2Result right = chi2_square(
       [](const PathRandom& r) {

@@ -24,7 +24,7 @@ double mixture_pdf(const BsdfClosure& closure, const Vec3& wo, const Vec3& wi, c
 
 bool close(double a, double b, double relative) { return std::abs(a - b) <= relative * std::abs(b) + 1e-7; }
 
-/// First disagreement between a sample and what the other functions say about its direction, or "".
+/// The first inconsistency between a sample and eval() and the densities of its direction; "" if there is none.
 std::string inconsistency(const BsdfClosure& closure, const Vec3& wo, const BsdfSample& s, const float* pmfs,
                           double tolerance) {
   const auto at = [&](const std::string& what) {
@@ -63,7 +63,7 @@ std::vector<std::string> check_closure(const BsdfClosure& closure, const Vec3& w
   if (pmf_sum > 1 + 1e-5)
     failures.push_back(fmt::format("{}: the lobes' probabilities sum to {}", options.name, pmf_sum));
 
-  // Item 2 on the first samples; counts of all.
+  // Item 2 for the first samples; counts for all of them.
   std::array<double, kMaxLobes> n_delta{}, n_smooth{};
   for (int i = 0; i < options.n_samples; ++i) {
     const BsdfSample s = draw(closure, wo, PathRandom(Sampling::kIndependent, options.seed, 0, 0, i));

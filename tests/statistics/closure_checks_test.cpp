@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// check_closure on a model with a diffuse, a mirror and a null lobe: accepted when right, and each planted bug named.
+// check_closure() on a BSDF with a diffuse, a mirror and a null lobe: accepts it if correct, names each planted bug.
 #include "statistics/closure_checks.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ enum class Bug {
   kLobeIndex,
 };
 
-/// 50 % diffuse of albedo 0.8, 30 % mirror, 20 % straight through.
+/// 50 % diffuse with albedo 0.8, 30 % mirror, 20 % null transmission.
 class TestClosure final : public BsdfClosure {
  public:
   explicit TestClosure(Bug bug) : bug_(bug) {}
@@ -83,7 +83,7 @@ TEST(CheckClosure, AcceptsARightClosure) {
   EXPECT_EQ(check(Bug::kNone, normalize({0.3f, 0.2f, -0.7f})), "");
 }
 
-// N = 100 000, alpha = 5e-7: the smallest error of a delta lobe's probability 0.3 seen with power 0.99 is 0.011.
+// N = 100 000, alpha = 5e-7: the smallest error in a delta lobe's probability of 0.3 detected with power 0.99 is 0.011.
 TEST(CheckClosure, NamesPlantedBugs) {
   const auto names = [](Bug bug, const std::string& part) {
     const std::string message = check(bug);

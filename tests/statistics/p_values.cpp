@@ -42,8 +42,8 @@ double uniform_p_value(std::span<const double> values) {
   const double n = static_cast<double>(sorted.size());
   double d = 0;
   for (size_t i = 0; i < sorted.size(); ++i) d = std::max({d, sorted[i] - i / n, (i + 1) / n - sorted[i]});
-  // Kolmogorov's distribution, which Boost.Math has from 1.75 on, with Stephens' correction for finite n (Stephens
-  // 1970, Table 1).
+  // Kolmogorov's distribution (in Boost.Math since 1.75) with Stephens' correction for finite n (Stephens 1970,
+  // Table 1).
   const double x = d * (std::sqrt(n) + 0.12 + 0.11 / std::sqrt(n));
   if (x < 0.2) return 1;
   double sum = 0;

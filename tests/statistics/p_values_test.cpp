@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The special functions against values from tables (Abramowitz & Stegun 1964, tables 26.1, 26.8, 26.10) and identities.
+// The special functions against tables (Abramowitz & Stegun 1964, tables 26.1, 26.8, 26.10) and identities.
 #include "statistics/p_values.h"
 
 #include <gtest/gtest.h>
@@ -43,7 +43,7 @@ TEST(PValues, BudgetArithmetic) {
   EXPECT_NEAR(sidak(1e-3, 200), 5.0025e-6, 1e-9);
   EXPECT_NEAR(-normal_quantile(sidak(1e-3, 200) / 2), 4.56, 0.01);
   EXPECT_NEAR(1 - std::pow(1 - sidak(1e-3, 37), 37), 1e-3, 1e-12);
-  // sigma = mean, alpha = 1e-4, power 0.99: N = 1e4 sees 6.2 %, 1e6 sees 0.62 %.
+  // sigma = mean, alpha = 1e-4, power 0.99: N = 1e4 detects 6.2 %, 1e6 0.62 %.
   EXPECT_NEAR(smallest_detectable(1, 1e4, 1e-4, 0.99), 0.062, 5e-4);
   EXPECT_NEAR(smallest_detectable(1, 1e6, 1e-4, 0.99), 0.0062, 5e-5);
 }
@@ -66,15 +66,15 @@ TEST(PValues, BinomialTailsAreExact) {
   EXPECT_FALSE(binomial_test(600, 1000, 0.5).accepted);
 }
 
-// N = 300 repetitions; alpha = 1e-6 for the Kolmogorov-Smirnov test; smallest deviation of the distribution function of
-// p-values it sees with power 0.99: 0.24. Planted bug: p-values of a biased mean.
+// N = 300 repetitions, alpha = 1e-6: with power 0.99 the Kolmogorov-Smirnov test detects a deviation of 0.24 in the
+// distribution function of the p-values. Planted bug: p-values of a biased mean.
 TEST(MeanTests, PValuesAreUniformUnderTheHypothesisAndNotUnderABias) {
   for (const bool biased : {false, true}) {
     std::vector<double> t_values, z_values;
     for (int repetition = 0; repetition < 300; ++repetition) {
       std::vector<double> sample;
       Moments moments;
-      for (int i = 0; i < 12; ++i) {  // nearly normal: sum of twelve uniform numbers, mean 6, variance 1
+      for (int i = 0; i < 12; ++i) {  // nearly normal: the sum of twelve uniform numbers, with mean 6 and variance 1
         const PathRandom random(Sampling::kIndependent, 20, repetition, i, 0);
         double sum = biased ? 0.4 : 0;
         for (uint32_t k = 0; k < 12; ++k) sum += random.get_1d(k, Event::kPixel) + 0x1p-25;
