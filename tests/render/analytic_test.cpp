@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Renders whose result is known in closed form, by `path` and by path tracers with a planted bug (planted_bugs.h).
+// Scenes with closed-form solutions, rendered by `path` and by path tracers with a planted bug (planted_bugs.h).
 //
 // Statistical cases: R = 32 renders with seeds 0 … 31, Student's t-test of the image mean at alpha = 5e-7 (|t_31| >
 // 6.3). With the standard error s of the mean of the 32 renders, the test rejects an error of 6.3 s + 2.5 s = 8.8 s
-// with power 0.99; each case asserts that this is below the relative error that it says it detects. Each bug that a
+// with power 0.99; each case asserts that this is below the relative error that it claims to detect. Every bug that a
 // case lists must be rejected.
 #include <cmath>
 
@@ -26,7 +26,8 @@ std::vector<double> image_means(const TestScene& scene, uint32_t spp) {
   return means;
 }
 
-/// The mean of the scene's images is `expected`; relative errors down to `detects` are found, and so are the bugs.
+/// Expects the mean of the scene's images to be `expected`, and that relative errors of `detects` and the bugs are
+/// detected.
 void expect_image_mean(const std::string& xml, uint32_t spp, double expected, double detects,
                        std::initializer_list<Bug> bugs) {
   const std::vector<double> means = image_means(load_text(xml), spp);
@@ -41,7 +42,7 @@ void expect_image_mean(const std::string& xml, uint32_t spp, double expected, do
     EXPECT_FALSE(statistics::t_test(image_means(load_text(xml, 0, with(bug)), spp), expected).accepted) << name_of(bug);
 }
 
-/// The same where all samples have one value.
+/// The same for scenes in which all samples have the same value.
 void expect_exact(const std::string& xml, double expected, std::initializer_list<Bug> bugs) {
   EXPECT_NEAR(image_mean(render(load_text(xml), 4, 0)), expected, 1e-4);
   for (const Bug bug : bugs)
@@ -60,7 +61,7 @@ std::string furnace(double albedo, int max_depth, const std::string& extra = "")
       16, 16, max_depth);
 }
 
-// Radiance in a closed box that emits 1 and reflects a: L = 1 + a L.
+// In a closed box with emission 1 and albedo a, L = 1 + a L.
 TEST(Furnace, UnlimitedDepthGivesTheGeometricSeries) {
   expect_image_mean(furnace(0.3, -1), 16, 1 / (1 - 0.3), 0.02,
                     {Bug::kNoDirectionWeight, Bug::kNoLightWeight, Bug::kCosineForgotten});
@@ -89,7 +90,7 @@ TEST(Furnace, RouletteFromTheFirstEdgeIsUnbiased) {
 }
 
 TEST(PathLengths, SingleLengthsAddUpToTheWhole) {
-  // The same random numbers decide whatever is left out, so this is exact up to rounding.
+  // All renders use the same random numbers, so this is exact up to rounding.
   const int max_depth = 7;
   const Film whole = render(load_text(furnace(0.5, max_depth)), 8, 3);
   std::vector<double> sums(16 * 16);
@@ -102,8 +103,7 @@ TEST(PathLengths, SingleLengthsAddUpToTheWhole) {
 
 TEST(PathLengths, ZeroIsBlack) { EXPECT_EQ(image_mean(render(load_text(furnace(0.5, 0)), 1, 0)), 0); }
 
-// In a dark room without a limit of depth only roulette ends paths; one whose throughput is not a number is a bad
-// sample.
+// In a dark room with unlimited depth, only Russian roulette ends paths; one with a NaN throughput is a bad sample.
 TEST(PathLengths, AThroughputThatIsNotANumberEnds) {
   const std::string dark_room =
       "<shape type='cube'><boolean name='flip_normals' value='true'/><bsdf type='diffuse'/></shape>";
@@ -115,18 +115,18 @@ TEST(PathLengths, AThroughputThatIsNotANumberEnds) {
   EXPECT_EQ(image_mean(film), 0);
 }
 
-// A diffuse plane z = 4 facing the camera, lit from the camera's side.
+// A diffuse plane at z = 4 that faces the camera, lit from the camera's side.
 const char* const kPlane =
     "<shape type='rectangle'><transform name='to_world'><scale value='50'/><rotate x='1' angle='180'/><translate "
     "z='4'/>"
     "</transform><bsdf type='diffuse'><rgb name='reflectance' value='0.6'/></bsdf></shape>";
-const char* const kNarrow = "<float name='fov' value='0.01'/>";  // all pixels see the point (0, 0, 4)
+const char* const kNarrow = "<float name='fov' value='0.01'/>";  // every pixel sees the point (0, 0, 4)
 
 const char* const kPointLight =
     "<emitter type='point'><point name='position' x='3' y='0' z='0'/><rgb name='intensity' value='10'/></emitter>";
 
 TEST(DirectLight, PointLightOverAPlane) {
-  // L = albedo / pi * I cos / d^2 at distance 5 under the angle with cosine 4/5.
+  // L = albedo / pi * I cos / d^2 with d = 5 and cos = 4/5.
   expect_exact(scene_text(std::string(kPlane) + kPointLight, 4, 4, 2, kNarrow), 0.6 / M_PI * 10 * 0.8 / 25,
                {Bug::kCosineForgotten});
 }
@@ -139,7 +139,7 @@ TEST(DirectLight, DirectionalLight) {
 }
 
 TEST(DirectLight, TwoEqualPointLights) {
-  // The same value whichever light is chosen.
+  // Both lights give the same value.
   expect_exact(scene_text(std::string(kPlane) + kPointLight + kPointLight, 4, 4, 2, kNarrow),
                2 * 0.6 / M_PI * 10 * 0.8 / 25, {Bug::kLightPmfForgotten, Bug::kCosineForgotten});
 }
@@ -149,13 +149,13 @@ const char* const kSphereLight =
     "</emitter></shape>";
 
 TEST(DirectLight, SphereLight) {
-  // Irradiance of a sphere of radiance L and radius r at distance d in direction cos: pi L (r/d)^2 cos.
+  // Irradiance from a sphere with radiance L and radius r at distance d: pi L (r/d)^2 cos.
   expect_image_mean(scene_text(std::string(kPlane) + kSphereLight, 16, 16, 2, kNarrow), 16, 0.6 * 7 * (1.0 / 25) * 0.8,
                     0.02, {Bug::kNoDirectionWeight, Bug::kCosineForgotten});
 }
 
 TEST(DirectLight, DiskLight) {
-  // Irradiance of a coaxial disk of radius r at distance d: pi L r^2 / (r^2 + d^2). The camera looks through it.
+  // Irradiance from a coaxial disk with radius r at distance d: pi L r^2 / (r^2 + d^2). The camera lies behind it.
   const std::string disk =
       "<shape type='disk'><transform name='to_world'><scale value='2'/><translate z='-1'/></transform>"
       "<emitter type='area'><rgb name='radiance' value='3'/></emitter></shape>";
@@ -164,8 +164,8 @@ TEST(DirectLight, DiskLight) {
 }
 
 TEST(DirectLight, EachInstanceOfALightShines) {
-  // Two placed copies of a sphere light that emits: the one of SphereLight, and one twice as large at the same
-  // direction and twice the distance, hidden behind nothing: each gives pi L (r/d)^2 cos.
+  // Two instances of a sphere light: the one of SphereLight, and one twice as large in the same direction at twice the
+  // distance; neither is occluded. Each gives pi L (r/d)^2 cos.
   const std::string group =
       "<shape type='shapegroup' id='lamp'><shape type='sphere'><emitter type='area'><rgb "
       "name='radiance' value='7'/></emitter></shape></shape>";
@@ -185,7 +185,7 @@ TEST(DirectLight, ConstantEnvironment) {
                     {Bug::kNoDirectionWeight, Bug::kNoLightWeight, Bug::kCosineForgotten});
 }
 
-/// Chooses lights by their power, otherwise as `path`.
+/// The parts of `path`, but with lights chosen by power.
 struct PartsWithPowerLights : PathParts {
   std::shared_ptr<const PowerLights> power_lights;
   void prepare(const Scene& scene) { power_lights = std::make_shared<PowerLights>(scene); }
@@ -194,7 +194,7 @@ struct PartsWithPowerLights : PathParts {
 
 TEST(DirectLight, TwoLightsAddUp) {
   const std::string xml = scene_text(std::string(kPlane) + kSphereLight + kDimSky, 16, 16, 2, kNarrow);
-  // The sphere hides its part of the environment: (7 - 0.25) for its share.
+  // The sphere occludes the environment behind it, hence 7 - 0.25 within its solid angle.
   const double expected = 0.6 * ((7 - 0.25) * 0.8 / 25 + 0.25);
   expect_image_mean(xml, 32, expected, 0.02, {Bug::kNoDirectionWeight, Bug::kNoLightWeight, Bug::kLightPmfForgotten});
 
@@ -207,8 +207,8 @@ TEST(DirectLight, TwoLightsAddUp) {
 }
 
 TEST(Glass, RadianceIsScaledWhereItLeavesAMedium) {
-  // A lamp inside a medium of index 1.5, seen from outside at normal incidence: (1 - F) L / n^2, F = ((n - 1) / (n +
-  // 1))^2.
+  // A light inside a dielectric with n = 1.5, seen from outside at normal incidence: (1 - F) L / n^2 with
+  // F = ((n - 1) / (n + 1))^2.
   const std::string face =
       "<shape type='rectangle'><transform name='to_world'><scale value='50'/><rotate x='1' angle='180'/>"
       "<translate z='%'/></transform>";
@@ -222,7 +222,7 @@ TEST(Glass, RadianceIsScaledWhereItLeavesAMedium) {
 }
 
 TEST(Mask, LightBehindHalfOpaqueSurfaces) {
-  // Two black surfaces of opacity 0.5 before a constant environment: a quarter of it arrives.
+  // Two black surfaces with opacity 0.5 in front of a constant environment transmit a quarter of it.
   const std::string veil =
       "<shape type='rectangle'><transform name='to_world'><scale value='50'/><translate z='%'/>"
       "</transform><bsdf type='mask'><float name='opacity' value='0.5'/><bsdf type='diffuse'><rgb "
@@ -239,8 +239,8 @@ TEST(HideEmitters, LightsAreInvisibleButShine) {
       "<shape type='rectangle'><transform name='to_world'><translate z='1'/></transform><emitter type='area'><rgb "
       "name='radiance' value='5'/></emitter></shape>";
   const std::string hide = "<boolean name='hide_emitters' value='true'/>";
-  // The rectangle 2 x 2 lies between camera and plane and faces the plane, seen at distance 3 from its centre. Form
-  // factor of four unit squares over a point below their common corner.
+  // A rectangle of 2 x 2 between camera and plane faces the plane at a distance of 3: the form factor of four unit
+  // squares over a point below their common corner.
   const double a = 1.0 / 3, s = std::sqrt(1 + a * a);
   const double irradiance = 5 * 4 * 0.5 * 2 * (a / s) * std::atan(a / s);
   expect_image_mean(scene_text(body, 16, 16, 2, kNarrow, hide), 16, 0.6 / M_PI * irradiance, 0.02,

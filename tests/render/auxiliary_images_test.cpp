@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Auxiliary images show the first surface; those for denoisers what is seen in mirrors and through glass.
+// Auxiliary images show the first hit; those for denoisers, what is seen in mirrors and through glass.
 #include "integrators/aov.h"
 
 #include "render_fixture.h"
@@ -10,7 +10,7 @@ namespace {
 constexpr int kSide = 8;
 constexpr uint32_t kSamples = 16;
 
-/// A square of side 200 across the z axis; `turned`: faces +z instead of -z.
+/// A square with sides of 200, perpendicular to the z axis; `turned`: faces +z instead of -z.
 std::string wall(double z, const std::string& bsdf, bool turned = false) {
   return "<shape type='rectangle'><transform name='to_world'><scale value='100'/>" +
          std::string(turned ? "" : "<rotate y='1' angle='180'/>") + "<translate z='" + std::to_string(z) +
@@ -54,7 +54,7 @@ TEST(AuxiliaryImages, WithoutMirrorsBothKindsHaveTheSameBits) {
   expect_constant(images.at("N"), {0, 0, -1});
 }
 
-// A dark wall hides a half of a bright one; its edge lies in the middle of pixels, or where `shift` tells.
+// The largest error of the albedo where a dark wall occludes half of a bright one.
 double largest_error(uint32_t most, double edge) {
   const std::string half =
       "<shape type='rectangle'><transform name='to_world'><rotate y='1' angle='180'/><translate "
@@ -68,7 +68,7 @@ double largest_error(uint32_t most, double edge) {
   return largest;
 }
 
-// 64 independent samples of the 20 pixels or so have errors of up to 0.1.
+// With 64 independent samples, the 20 pixels or so along the edge would have errors of up to 0.1.
 TEST(AuxiliaryImages, EdgesAreExactWithFewSamples) { EXPECT_LT(largest_error(64, 0.03), 0.04); }
 
 TEST(AuxiliaryImages, AMirrorShowsWhatItReflectsInItsColour) {
@@ -79,7 +79,7 @@ TEST(AuxiliaryImages, AMirrorShowsWhatItReflectsInItsColour) {
   expect_constant(images.at("DenoisingNormal"), {0, 0, 1});
 }
 
-// Behind the pane and in it there is a wall of the same colour, so that it does not matter which is drawn.
+// A wall of the same colour is behind the pane and reflected in it, so it does not matter which event is sampled.
 TEST(AuxiliaryImages, APaneShowsTheWallBehind) {
   const auto images =
       images_of(wall(3, kPane) + wall(5, diffuse("0.2, 0.4, 0.8")) + wall(-5, diffuse("0.2, 0.4, 0.8"), true));
@@ -93,7 +93,7 @@ TEST(AuxiliaryImages, AMirrorOfTheSkyIsEmpty) {
   expect_constant(images.at("Albedo"), {1, 1, 1});
 }
 
-// Between two parallel mirrors the way ends after kFollowedBounces.
+// Between two parallel mirrors, paths end after kFollowedBounces.
 TEST(AuxiliaryImages, ParallelMirrorsEndTheWay) {
   const auto images = images_of(wall(5, mirror("0.5")) + wall(-5, mirror("0.5"), true));
   const auto expected = static_cast<float>(std::pow(0.5, kFollowedBounces + 1));

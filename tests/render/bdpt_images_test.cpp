@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images of bidirectional path tracing against those of `path`, and planted bugs that must be seen.
+// Images of bidirectional path tracing against those of `path`, and planted bugs that must be detected.
 //
 // Statistical cases: R = 32 renders of each integrator with seeds 0 … 31, Student's t-test of the differences of image
-// means at alpha = 5e-7. Each case asserts that it rejects, with power 0.99, the relative error that it says.
+// means at alpha = 5e-7. Each case asserts that it detects, with power 0.99, the relative error that it claims.
 #include <algorithm>
 #include <cmath>
 
@@ -19,10 +19,10 @@ constexpr int kRenders = 32, kSize = 8;
 
 enum class Bug {
   kNone,
-  kNoAdjoint,          ///< the shading normals of light subpaths
-  kRadianceFromLight,  ///< squared ratios of indices on light subpaths
-  kLightPmfForgotten,  ///< of emission
-  kSplatsNotDivided,   ///< by the number of light paths
+  kNoAdjoint,          ///< light subpaths ignore the correction for shading normals
+  kRadianceFromLight,  ///< light subpaths scale by squared ratios of indices, as for radiance
+  kLightPmfForgotten,  ///< emission is not divided by the light's probability
+  kSplatsNotDivided,   ///< splats are not divided by the number of light paths
 };
 
 struct PartsWithBug : BidirectionalParts {
@@ -39,7 +39,7 @@ struct PartsWithBug : BidirectionalParts {
   float splat_factor() const { return bug == Bug::kSplatsNotDivided ? 4 : 1; }
 };
 
-/// How a scene is rendered.
+/// Settings of the integrator.
 struct Mode {
   bool light_tracing = false;
   Bug bug = Bug::kNone;
@@ -64,7 +64,7 @@ TestScene load_path(const std::string& xml) {
   });
 }
 
-/// The part of the image that light passes add.
+/// Mean of the image of the light pass; 0 without light tracing.
 double light_image_mean(const TestScene& scene, uint32_t spp, uint64_t seed, double light_paths) {
   const LightTracingIntegrator* tracer = light_tracer(scene.integrator());
   if (!tracer) return 0;
@@ -88,7 +88,7 @@ struct Comparison {
   double detectable = 0;  ///< relative
 };
 
-/// The difference from `expected`, the means of `path`.
+/// Compares image means with `expected`, those of `path`.
 Comparison compare(const std::string& xml, const Mode& mode, uint32_t spp, const std::vector<double>& expected) {
   const std::vector<double> means = image_means(load_bdpt(xml, mode), spp, mode.light_paths, 0);
   std::vector<double> differences;
@@ -102,7 +102,7 @@ Comparison compare(const std::string& xml, const Mode& mode, uint32_t spp, const
   return {statistics::t_test(differences, 0), 1.3 * detectable / whole.mean()};
 }
 
-/// Without and with light tracing. The bugs must be seen with it, those of `of_connections` also without.
+/// Compares without and with light tracing. `bugs` must be detected with it, `of_connections` also without.
 void expect_images_of_path(const std::string& xml, uint32_t spp, double detects, const std::vector<Bug>& bugs = {},
                            const std::vector<Bug>& of_connections = {}) {
   const std::vector<double> expected = image_means(load_path(xml), spp, 0, 100);
@@ -120,7 +120,7 @@ void expect_images_of_path(const std::string& xml, uint32_t spp, double detects,
 const char* const kDown = "<lookat origin='0, 3, -1' target='0, -1.5, 4' up='0, 1, 0'/>";
 std::string sensor() { return std::string("<transform name='to_world'>") + kDown + "</transform>"; }
 
-// A floor with leaning normals sees the light directly and from a wall.
+// A floor with tilted shading normals sees the light directly and by way of a wall.
 TEST(BdptImages, LeaningNormals) {
   expect_images_of_path(
       bdpt_scene(leaning_floor(diffuse(0.8)) +
@@ -130,7 +130,7 @@ TEST(BdptImages, LeaningNormals) {
       64, 0.06, {Bug::kNoAdjoint, Bug::kSplatsNotDivided});
 }
 
-// A small spot on the floor lights the wall that the camera sees: light subpaths find it, which are joined to the wall.
+// A small spot on the floor lights the wall that the camera sees: light subpaths that connect to the wall find it.
 TEST(BdptImages, SpotOnLeaningNormals) {
   const char* const kNarrow =
       "<emitter type='spot'><transform name='to_world'><lookat origin='0, 1, 2' target='3, -2, 7' up='0, 1, 0'/>"
@@ -144,7 +144,7 @@ TEST(BdptImages, SpotOnLeaningNormals) {
       128, 0.2, {Bug::kNoAdjoint}, {Bug::kNoAdjoint});
 }
 
-// A lamp behind glass: only paths through delta events; rough glass, where subpaths are joined on it.
+// A light behind glass, reached only through delta events; and rough glass, on which subpaths connect.
 TEST(BdptImages, Glass) {
   const std::string floor =
       rectangle("<scale value='4'/><rotate x='1' angle='-90'/><translate y='-1' z='4'/>", diffuse(0.7));
@@ -158,7 +158,7 @@ TEST(BdptImages, Glass) {
       64, 0.1, {Bug::kRadianceFromLight});
 }
 
-// Lights of unlike power, so that emission does not choose them alike.
+// Lights of different power, so that emission chooses them with different probabilities.
 TEST(BdptImages, ManyLights) {
   const std::string room =
       leaning_floor(diffuse(0.6)) +
@@ -181,7 +181,7 @@ TEST(BdptImages, ThinLensAndHiddenLights) {
       64, 0.07);
 }
 
-/// A floor, a ceiling and a lamp within 80 units around the camera, with lengths multiplied by `scale`.
+/// A floor, a ceiling and a light within 80 units of the camera, with all lengths multiplied by `scale`.
 std::string scaled_scene(const std::string& scale) {
   const auto placed = [&](const std::string& transform, const std::string& content) {
     return rectangle(transform + "<scale value='" + scale + "'/>", content);
@@ -201,7 +201,8 @@ TEST(BdptImages, ScaledScenes) {
   }
 }
 
-// Powers of two do not round: below one unit, where lengths have no absolute size, the images have the same bits.
+// Scaling by powers of two does not round: for scenes below one unit, where no absolute length matters, images have the
+// same bits.
 TEST(BdptImages, SmallScenesDoNotKnowTheUnitOfLength) {
   for (const char* integrator : {"path", "bdpt"}) {
     SCOPED_TRACE(integrator);
@@ -217,7 +218,7 @@ TEST(BdptImages, SmallScenesDoNotKnowTheUnitOfLength) {
   }
 }
 
-// Any number of light paths for each sample has the same mean.
+// Any number of light paths per sample gives the same mean.
 TEST(BdptImages, FewOrManyLightPaths) {
   const std::string xml = bdpt_scene(leaning_floor(diffuse(0.6)) + area_lights(), kSize, 3, "", sensor());
   const std::vector<double> expected = image_means(load_path(xml), 64, 0, 100);

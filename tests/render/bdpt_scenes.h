@@ -24,7 +24,7 @@ inline std::string area_light(double radiance) {
   return "<emitter type='area'><rgb name='radiance' value='" + std::to_string(radiance) + "'/></emitter>";
 }
 
-/// A floor whose interpolated normals lean away from the geometric ones; writes the file that it refers to.
+/// A floor whose interpolated normals are tilted from the geometric ones; writes the file that it refers to.
 inline std::string leaning_floor(const std::string& bsdf) {
   std::ofstream(test_support::test_file("leaning.obj"))
       << "v -4 -2 1\nv 4 -2 1\nv 4 -2 9\nv -4 -2 9\nvn 0.5 1 0\nvn -0.3 1 0.4\nvn 0.2 1 -0.6\nvn -0.5 1 -0.2\n"
@@ -44,7 +44,7 @@ inline const char* const kMask =
 inline const char* const kBumps =
     "<bsdf type='bumpmap'><texture type='checkerboard'/><float name='scale' value='0.3'/><bsdf type='plastic'/></bsdf>";
 
-/// What stands in the room.
+/// Objects in the room, with various BSDFs.
 inline std::string materials() {
   return leaning_floor(diffuse(0.6)) +
          rectangle("<scale value='6'/><rotate x='1' angle='180'/><translate z='9'/>", kRoughMetal) +
@@ -69,7 +69,7 @@ inline const char* const kTwoSides =
     "<bsdf type='twosided'><boolean name='allow_transmission' value='true'/><bsdf type='roughdielectric'>"
     "<float name='alpha' value='0.4'/></bsdf><bsdf type='diffuse'/></bsdf>";
 
-/// Models, lights and placements that the room above lacks.
+/// BSDFs, lights and instances that the room above lacks.
 inline std::string more_materials() {
   const std::string textured =
       "<emitter type='area'><texture type='checkerboard' name='radiance'><rgb name='color0' value='6'/>"
@@ -109,7 +109,7 @@ inline const char* const kDirectional =
 inline const char* const kThinLens =
     "<float name='aperture_radius' value='0.2'/><float name='focus_distance' value='4'/>";
 
-/// `scene_text` with integrator bdpt.
+/// scene_text() with the integrator bdpt.
 inline std::string bdpt_scene(const std::string& body, int size, int max_depth, const std::string& settings = "",
                               const std::string& sensor = "", const std::string& lens = "") {
   std::string text = scene_text(body, size, size, max_depth, sensor, settings);

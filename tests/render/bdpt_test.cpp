@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bidirectional path tracing against `path`, and technique by technique against whole paths whose densities are written
-// out (reference_bdpt.h). Exact up to rounding; no statistics.
+// Bidirectional path tracing against `path`, and each technique against whole paths with explicit densities
+// (reference_bdpt.h). Exact up to rounding; no statistics.
 #include "bdpt_scenes.h"
 #include "integrators/bidirectional_tracer.h"
 #include "integrators/path_tracer.h"
@@ -12,12 +12,12 @@ namespace {
 using reference_bdpt::Contribution;
 using reference_bdpt::Contributions;
 
-/// The techniques s <= 1 alone.
+/// The techniques s <= 1 only.
 struct WithoutLightSubpaths : BidirectionalParts {
   int max_light_vertices() const { return 1; }
 };
 
-/// Writes down what each technique adds.
+/// Records the contribution of each technique.
 struct RecordingParts : BidirectionalParts {
   Contributions* contributions = nullptr;
   void record(int s, int t, const Spectrum& value, double weight) const {
@@ -59,7 +59,7 @@ class Bdpt : public ::testing::TestWithParam<Scenery> {
 
 double scale_of(const Spectrum& s) { return std::max(1e-6, static_cast<double>(max_component(s))); }
 
-// Same addresses, same densities, same heuristic.
+// Both use the same random numbers, densities and heuristic.
 TEST_P(Bdpt, WithoutLightSubpathsItIsThePathTracer) {
   if (GetParam().heuristic != Heuristic::kPower) return;
   const std::string xml = text(-1, "<integer name='rr_depth' value='3'/>");
@@ -85,8 +85,8 @@ TEST_P(Bdpt, WithoutLightSubpathsItIsThePathTracer) {
   EXPECT_GT(n_lit, 1000);
 }
 
-/// Counts pairs of contributions that differ. Directions that were sampled differ a little from those between the
-/// vertices that were found, because rays start beside surfaces: so a few of many do, at grazing angles.
+/// Counts pairs of contributions that differ. Sampled directions differ a little from those between the vertices found,
+/// because rays start at an offset from surfaces: so a few of many do differ, at grazing angles.
 struct Agreement {
   int n = 0, n_off = 0;
   void add(const Spectrum& got, const Spectrum& expected, double weight_difference) {
@@ -111,8 +111,8 @@ BidirectionalSettings tracer_settings(const Scenery& scenery, const PathLengthSe
   return {lengths, {LightTracing::kOn, 1}, scenery.heuristic};
 }
 
-// Each technique finds the path that it should, with the value and the weight of the densities written out: so the
-// weights of all techniques of a path sum to one.
+// Each technique finds the path that it should, with the value and the weight of the explicit densities, so the weights
+// of all techniques of a path sum to one.
 TEST_P(Bdpt, TechniquesEqualDensitiesWrittenOut) {
   constexpr int kMaxDepth = 5;
   for (const bool light_tracing : {false, true}) {
@@ -187,7 +187,7 @@ TEST_P(Bdpt, SplatsEqualDensitiesWrittenOut) {
   EXPECT_LE(by_pixel.size(), 1.01 * agreement.n);
 }
 
-// Samples of a batch, with common random numbers those that share a light subpath, are what each is alone.
+// Samples traced in a batch (with common random numbers: that share a light subpath) equal those traced alone.
 TEST_P(Bdpt, SamplesDoNotDependOnTheirBatch) {
   const TestScene scene = load_text(text(-1), 0, [](const PathLengthSettings& lengths) {
     return std::make_shared<BidirectionalTracer<BidirectionalParts>>(BidirectionalSettings{lengths, {}, {}});

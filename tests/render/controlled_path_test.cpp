@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// `controlled-path` estimates the same image as `path`, whatever its coefficients are.
+// `controlled-path` estimates the same image as `path` for any coefficients.
 //
 // Statistical cases: 16 renders with seeds 0 … 15; Student's t-test on the means of 16 blocks of the image and of the
-// whole, each at alpha = 5e-7. Two renders of one seed share all their numbers, so that their difference is the control
-// variate alone, which must have the mean zero.
+// whole, each at alpha = 5e-7. Two renders with one seed share all their random numbers, so that their difference is
+// the control variate alone, whose mean must be zero.
 #include "integrators/controlled_path.h"
 
 #include <tbb/global_control.h>
@@ -18,14 +18,14 @@
 namespace covary {
 namespace {
 
-/// A surface on which many direction samples fail, below it.
+/// A surface on which many direction samples fail because they point below it.
 const std::string kRoughMetal =
     scene_text(rectangle("<scale value='8'/><rotate x='1' angle='-80'/><translate y='-2' z='5'/>",
                          "<bsdf type='roughconductor'><float name='alpha' value='0.9'/></bsdf>") +
                    kMeshLight + "<emitter type='constant'><rgb name='radiance' value='0.5'/></emitter>",
                kSide, kSide, 3, kWide);
 
-/// A diffuse floor under lights of different colours.
+/// A diffuse floor below lights of different colours.
 std::string coloured_lights() {
   std::string lights;
   for (int i = 0; i < 6; ++i)
@@ -37,12 +37,12 @@ std::string coloured_lights() {
   return scene_text(kFloor + lights, kSide, kSide, 2, kWide);
 }
 
-/// With `to` in place of `from`.
+/// `text` with the first `from` replaced by `to`.
 std::string replaced(std::string text, const std::string& from, const std::string& to) {
   return text.replace(text.find(from), from.size(), to);
 }
 
-/// Another colour on each check of a board.
+/// A checkerboard texture.
 std::string checks(const std::string& name) {
   return "<texture name='" + name +
          "' type='checkerboard'><rgb name='color0' value='0.1,0.9,0.3'/><rgb name='color1' value='0.9,0.05,0.6'/>"
@@ -67,7 +67,7 @@ struct AlbedoForgottenAtEnds : ControlledParts {
   static Spectrum albedo_scale(const Spectrum& scale, bool ended) { return ended ? Spectrum(1) : scale; }
 };
 
-/// With a planted bug.
+/// `controlled-path` with a planted bug.
 template <typename Parts>
 class WithBug final : public ControlledPath {
  public:
@@ -99,7 +99,7 @@ ControlledPath& integrator_of(const TestScene& scene) {
 
 constexpr uint32_t kFirstDense = 1000;
 
-/// One cell for all of space, in which the coefficients of lights and dense techniques are what `value` says.
+/// A single cell for all of space, with the coefficients of lights and dense techniques from `value`.
 template <typename Value>
 CoefficientTable one_cell(const TestScene& scene, uint32_t n_dense, const Value& value) {
   const LightSet& lights = integrator_of(scene).lights();
@@ -125,7 +125,7 @@ Spectrum random_colour(uint32_t i) {
   return {4 * number(0) + shift, 4 * number(1) + shift, 4 * number(2) + shift};
 }
 
-/// A controlled-path with random coefficients, or with control off, ready to trace.
+/// A controlled-path ready to trace, with random coefficients or with control off.
 template <typename Parts = ControlledParts>
 TestScene with_coefficients(const std::string& xml, bool random) {
   TestScene scene = controlled<Parts>(xml, options(random ? ControlKind::kRgb : ControlKind::kOff));
@@ -134,7 +134,7 @@ TestScene with_coefficients(const std::string& xml, bool random) {
   return scene;
 }
 
-/// Trained as a render trains it, but for the importance of pixels.
+/// Trained as in a render, but without the importance of pixels.
 TestScene trained(const std::string& xml, const ControlSettings& options) {
   TestScene scene = controlled(xml, options);
   const LoadedScene& l = scene.loaded;
@@ -143,7 +143,7 @@ TestScene trained(const std::string& xml, const ControlSettings& options) {
   return scene;
 }
 
-// Σ_k r_k = 1 at every sample, so equal coefficients have no effect: a test without chance.
+// Σ_k r_k = 1 for every sample, so equal coefficients have no effect: no statistics.
 TEST(ControlledPath, EqualCoefficientsCancel) {
   const TestScene off = with_coefficients(everything(), false);
   const Film plain = render(off, 4, 1);
@@ -202,7 +202,7 @@ TEST(ControlledPath, TrainedAgreesWithPath) {
     EXPECT_EQ(n_biased(differences(trained(everything(), options(kind)), off, 16, 0)), 0) << static_cast<int>(kind);
 }
 
-// Each seed trains anew, and the samples of the training are a part of the image.
+// Each seed trains anew, and the training samples are part of the image.
 TEST(ControlledPath, TrainedOnTheFlyAgreesWithPath) {
   const TestScene path = load_text(everything());
   const auto planned = [](const TestScene& scene, bool twice) {
@@ -212,7 +212,7 @@ TEST(ControlledPath, TrainedOnTheFlyAgreesWithPath) {
       const RenderResult result = render(scene.loaded, plain_plan(Sampling::kIndependent), request);
       EXPECT_GT(result.training.samples[0], 4);
       Image image = result.picture();
-      if (twice)  // planted bug: the training is added to the image without its weight
+      if (twice)  // planted bug: the training image is added without its weight
         for (size_t i = 0; i < image.data.size(); ++i) image.data[i] += 0.2f * result.training.mean.data[i];
       return image;
     };
@@ -231,7 +231,7 @@ TEST(ControlledPath, TrainedOnTheFlyAgreesWithPath) {
   }
 }
 
-// [Hua2023] Sec. 6.1: 8 samples by plain MIS, the first of which gives the values of pixels; one solution after them.
+// [Hua2023] Sec. 6.1: 8 samples by plain MIS, the first of which gives the pixel values; then a single solve.
 TEST(ControlledPath, AsPublishedThereIsNoControlBeforeTheTrainingHasEnded) {
   const auto image_of_training = [](ControlSettings settings) {
     settings.grid = 8, settings.lights = LightSelection::kPower;
@@ -280,7 +280,7 @@ TEST(ControlledPath, AlbedoTellsTexturesApart) {
   const auto noise_of = [&](ControlKind kind, bool albedo) { return noise(trained(board, with_albedo(albedo, kind))); };
   EXPECT_LT(noise_of(ControlKind::kRgb, true), 0.7 * noise_of(ControlKind::kRgb, false));
   EXPECT_LT(noise_of(ControlKind::kMono, true), 1.05 * noise_of(ControlKind::kMono, false));
-  // Nothing changes where it is 1, or where coefficients belong to pixels or to light samples alone.
+  // Nothing changes if it is 1, or if coefficients belong to pixels or only to light samples.
   const std::string white = replaced(coloured_lights(), kReflectance, "<rgb name='reflectance' value='1'/>");
   for (const ControlKind kind : {ControlKind::kRgb, ControlKind::kOptimalMis, ControlKind::kVevoda}) {
     const std::string& scene = kind == ControlKind::kRgb ? white : board;
@@ -291,7 +291,7 @@ TEST(ControlledPath, AlbedoTellsTexturesApart) {
 }
 
 TEST(ControlledPath, AlbedoIsUnbiased) {
-  // Many directions fail at the metal, which ends their paths.
+  // Many directions fail on the metal, which ends their paths.
   const std::string metal = replaced(kRoughMetal, kAlpha, kAlpha + checks("specular_reflectance"));
   const TestScene off = with_coefficients(metal, false), on = trained(metal, with_albedo(true));
   const Differences right = differences(on, load_text(metal), 16, 100);
@@ -300,7 +300,7 @@ TEST(ControlledPath, AlbedoIsUnbiased) {
   EXPECT_EQ(n_biased(differences(on, off, 16, 0)), 0);
   EXPECT_EQ(n_biased(differences(with_coefficients(metal, true), off, 16, 0)), 0);
   EXPECT_GT(n_biased(differences(with_coefficients<AlbedoForgottenAtEnds>(metal, true), off, 16, 0)), 0);
-  // What looks black has highlights: coefficients are not multiplied by zero.
+  // A black plastic has highlights: coefficients are not multiplied by zero.
   const std::string plastic = replaced(
       coloured_lights(), "<bsdf type='diffuse'>" + kReflectance,
       "<bsdf type='roughplastic'><float name='alpha' value='0.4'/><rgb name='diffuse_reflectance' value='0'/>");
@@ -309,7 +309,7 @@ TEST(ControlledPath, AlbedoIsUnbiased) {
   EXPECT_LT(noise(black), 0.8 * noise(with_coefficients(plastic, false)));
 }
 
-/// A room of diffuse walls, of which a light behind a shield shines on the ceiling alone.
+/// A room with diffuse walls, whose light faces the ceiling.
 std::string indirect_room() {
   const std::string white =
       "<bsdf type='twosided'><bsdf type='diffuse'><rgb name='reflectance' value='0.7'/></bsdf>"
@@ -332,7 +332,7 @@ ControlSettings with_indirect(ControlKind kind = ControlKind::kRgb) {
   return result;
 }
 
-/// Coefficients that grow along the bins, and no others, ready to trace.
+/// Ready to trace, with indirect coefficients only, which increase along the bins.
 template <typename Parts = ControlledParts>
 TestScene with_bins(const std::string& xml) {
   TestScene scene = controlled<Parts>(xml, with_indirect());
@@ -356,7 +356,7 @@ TestScene with_bins(const std::string& xml) {
 
 TEST(ControlledPath, BinsOfDirectionsAreEquallyProbable) {
   std::vector<int> counts(DirectionBins::kCount);
-  constexpr int kSteps = 32;  // a multiple of the bins on a side
+  constexpr int kSteps = 32;  // a multiple of the number of bins per side
   for (int y = 0; y < kSteps; ++y)
     for (int x = 0; x < kSteps; ++x)
       ++counts[DirectionBins::of({static_cast<float>(x) / kSteps, static_cast<float>(y) / kSteps})];
@@ -399,7 +399,7 @@ TEST(ControlledPath, IndirectControlHasTheSameBitsForAnyNumberOfThreads) {
   }
 }
 
-/// Kinds of control that have no cells of their own, and paths without other surfaces, have nothing to add.
+/// Kinds of control without cells of their own, and paths of fewer edges, have nothing to add.
 TEST(ControlledPath, IndirectControlNeedsCellsAndPathsOfThreeEdges) {
   for (const ControlKind kind : {ControlKind::kOff, ControlKind::kVevoda, ControlKind::kOptimalMis}) {
     ControlSettings without = with_indirect(kind);
@@ -423,7 +423,7 @@ TEST(ControlledPath, PixelsHaveOptimalWeightsOfTheirOwn) {
   EXPECT_EQ(integrator_of(scene).settings().pilot_spp(), 0u);
 }
 
-/// A bright light behind the ceiling, and a small one in the room.
+/// A bright light occluded by the ceiling, and a small one in the room.
 std::string hidden_light() {
   return scene_text(
       kFloor +
@@ -449,7 +449,7 @@ TEST(ControlledPath, LearnsHowToChooseLights) {
     EXPECT_EQ(n_biased(differences(trained(everything(), options(kind, LightSelection::kLearned)),
                                    with_coefficients(everything(), false), 16, 100)),
               0);
-  // Trained again it is as if nothing had been.
+  // Training again starts from scratch.
   const TestScene scene = trained(hidden_light(), options(ControlKind::kRgb, LightSelection::kLearned));
   const std::string description = scene.integrator().description();
   const LoadedScene& l = scene.loaded;
@@ -483,7 +483,7 @@ TEST(ControlledPath, SameBitsForAnyNumberOfThreads) {
   }
 }
 
-/// Trains and renders; the mean of the image.
+/// Trains and renders; returns the image mean.
 double trained_mean(const std::string& xml, const ControlSettings& wanted = options(ControlKind::kRgb)) {
   return image_mean(render(trained(xml, wanted), 2, 0));
 }
@@ -516,7 +516,7 @@ TEST(ControlledPath, LeavesOutTrainingSamplesThatAreNotFinite) {
   ASSERT_TRUE(train(scene.scene(), integrator_of(scene), settings));
   EXPECT_EQ(counts, (std::vector<uint32_t>{2, 4}));  // after the pilot, and after the wave that follows it
   EXPECT_GT(integrator_of(scene).cache().n_rejected(), 100u);
-  EXPECT_GT(image_mean(render(scene, 2, 0)), 0.1);  // and no sample is bad
+  EXPECT_GT(image_mean(render(scene, 2, 0)), 0.1);  // also expects no bad samples
 }
 
 TEST(ControlledPath, KeepsToItsMemoryByWiderCells) {

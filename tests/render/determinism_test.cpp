@@ -44,7 +44,7 @@ TEST(Determinism, OneTwoAndFiveThreads) {
     }
 }
 
-/// Flat and smooth meshes, one-sided and two-sided, of one reflectance and of textures, delta and other lights; the
+/// Flat and smooth meshes, one-sided and two-sided, with constant and textured reflectance, delta and other lights; the
 /// number of samples leaves blocks partly filled.
 TEST(Determinism, VerticesInBlocksHaveTheBitsOfSingleOnes) {
   const std::string body = R"(
@@ -101,7 +101,7 @@ TEST(Determinism, PointsOfSequencesNeedTheGroupsOfTheFilm) {
   EXPECT_THROW(render_pass(scene.scene(), scene.integrator(), settings, film), Error);
 }
 
-// Stopped at random moments (after a random number of tiles), written, read and continued, until done.
+// A render stopped after random numbers of tiles, written, read and continued until it is complete.
 void interrupt_twenty_times(Sampler sampler) {
   const TestScene scene = load_room(70, 45);
   constexpr uint32_t kSpp = 60;
@@ -136,13 +136,13 @@ void interrupt_twenty_times(Sampler sampler) {
 TEST(Determinism, TwentyInterruptions) { interrupt_twenty_times(Sampler::kIndependent); }
 TEST(Determinism, TwentyInterruptionsOfSequences) { interrupt_twenty_times(Sampler::kSobol); }
 
-/// What a sample of the stand-in below is worth: many digits, so that any other order of additions shows.
+/// The value of a sample of the integrator below, with so many digits that any other order of additions shows.
 Spectrum value_of(const CameraSample& sample) {
   const Vec2 u = sample.random.get_2d(1, Event::kLightPosition);
   return Spectrum(1 / (u.x + 1e-3f), u.y, sample.random.get_1d(1, Event::kLobe) / 3);
 }
 
-/// An integrator that traces nothing, for tests of how samples reach the film.
+/// An integrator that traces no rays, for tests of how samples are added to the film.
 class Numbers final : public Integrator {
  public:
   std::shared_ptr<Integrator> clone() const override { return std::make_shared<Numbers>(); }
@@ -152,14 +152,14 @@ class Numbers final : public Integrator {
   std::string description() const override { return "numbers"; }
 };
 
-/// A map of counts that looks like noise, 0 … most.
+/// A map of random sample counts, 0 … most.
 std::vector<uint32_t> uneven_map(const Film& film, uint32_t most) {
   std::vector<uint32_t> map(film.counts().size());
   for (size_t i = 0; i < map.size(); ++i) map[i] = static_cast<uint32_t>(mix64(i) % (most + 1));
   return map;
 }
 
-// However many groups, however large the steps, and wherever a wave is cut.
+// For any number of groups, any step size, and any split of a wave.
 TEST(Determinism, AnySplitGivesTheBitsOfOneGo) {
   const TestScene scene = load_room(40, 21);
   const Numbers numbers;
@@ -187,7 +187,7 @@ TEST(Determinism, AnySplitGivesTheBitsOfOneGo) {
   }
 }
 
-// Stopped in the middle of waves, with counts that differ from pixel to pixel.
+// Stops in the middle of waves, with different counts per pixel.
 TEST(Determinism, StopsInWavesOfAMapLeaveTheBits) {
   const TestScene scene = load_room(70, 45);
   const Numbers numbers;
@@ -257,7 +257,7 @@ TEST(Determinism, WavesDoubleUntilAboutSixteenSamples) {
 
 TEST(Determinism, StoppedInAWaveNoPixelHasLessThanHalfTheSamplesOfAnother) {
   const TestScene scene = load_room(64, 48);
-  for (const int n_tiles : {15, 30, 40, 50}) {  // of 12 in each wave; the first takes one sample of each pixel
+  for (const int n_tiles : {15, 30, 40, 50}) {  // a wave has 12 tiles; the first takes one sample per pixel
     Film film = new_film(scene);
     PassSettings settings = pass(scene, Sampling::kIndependent, 1u << 30);
     std::atomic<bool> stop{false};
@@ -277,7 +277,7 @@ TEST(Determinism, TimeLimitStopsAfterATile) {
   const TestScene scene = load_room(64, 48);
   Film film = new_film(scene);
   PassSettings settings = pass(scene, Sampling::kIndependent, 1u << 30);
-  settings.seconds = 1e-9;  // is over when the first tile is done, however fast
+  settings.seconds = 1e-9;  // over when the first tile is done, however fast
   const PassResult result = render_pass(scene.scene(), scene.integrator(), settings, film);
   EXPECT_FALSE(result.complete);
   EXPECT_GE(result.n_samples, 256u);
@@ -308,7 +308,7 @@ TEST(Determinism, DoublingAllLightsDoublesTheImage) {
 }
 
 TEST(CommonRandomNumbers, AFlatUniformlyLitWallIsFlat) {
-  // A wall that fills the view, lit only by a constant environment: every pixel's path sees the same.
+  // A wall that fills the view, lit only by a constant environment: all pixels' paths see the same.
   const TestScene scene = load_text(
       scene_text("<shape type='rectangle'><transform name='to_world'><scale value='1000'/><rotate y='1' "
                  "angle='180'/><translate z='1'/></transform>"
@@ -318,7 +318,7 @@ TEST(CommonRandomNumbers, AFlatUniformlyLitWallIsFlat) {
   for (int y = 0; y < 16; ++y)
     for (int x = 0; x < 24; ++x)
       for (int t = 0; t < 12; ++t) ASSERT_EQ(crn.group_mean(x, y, t), crn.group_mean(0, 0, t));
-  // The planted bug: independent numbers do not give a flat image.
+  // Planted bug: independent random numbers, which do not give a flat image.
   const Film independent = render(scene, 24, 5, Sampling::kIndependent, 12);
   EXPECT_NE(independent.group_mean(0, 0, 0), independent.group_mean(1, 0, 0));
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// `direct` against `path` of at most two edges, for several numbers of samples, and `depth` against distances.
+// `direct` against `path` with at most two edges, for several sample counts, and `depth` against distances.
 //
-// The independent unit is the render: 16 seeds, Student's t-test on block means (unbiased_images.h). With power 0.99 an
-// error of 1 % of the image mean is found, which the test asserts; light of 1.03 times the power is rejected.
+// Renders are the independent units: 16 seeds, Student's t-test on block means (unbiased_images.h). The test asserts
+// that it detects an error of 1 % of the image mean with power 0.99; lights with 1.03 times the power are rejected.
 #include <gtest/gtest.h>
 
 #include "unbiased_images.h"
@@ -34,7 +34,7 @@ TEST(Direct, IsPathOfTwoEdges) {
 }
 
 TEST(Direct, OneTechniqueAlone) {
-  // Without lights at points and without mirrors either technique finds all light.
+  // Without delta lights and mirrors, either technique finds all light.
   std::string scene = everything("", false);
   for (const char* glass : {"dielectric", "plastic"}) {
     const size_t at = scene.find(std::string("<bsdf type='") + glass + "'");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `guided-path` estimates the same image as `path`, whatever it has learnt.
+// `guided-path` estimates the same image as `path` for any guiding field.
 //
 // Statistical cases: 16 renders with seeds 0 … 15; Student's t-test on the means of 16 blocks of the image and of the
 // whole, each at alpha = 5e-7.
@@ -15,24 +15,24 @@
 namespace covary {
 namespace {
 
-/// Directions are drawn from the lobes of another leaf than that whose density is used.
+/// Directions are sampled from the lobes of another leaf than that of the density.
 struct OtherLeaf : GuidedParts {
   static Vec3 sample_guide(const VmfLobes&, const GuidingField& field, uint32_t leaf, float u_lobe, Vec2 u) {
     return field.leaf((leaf + 1) % field.n_leaves()).mixture.lobes.sample(u_lobe, u);
   }
 };
-/// The density with which the BSDF finds the same direction is left out.
+/// The BSDF's density for the same direction is left out.
 struct NoBsdfDensity : GuidedParts {
   static float mixture_pdf(float g, float pdf_bsdf, float pdf_guide) {
     return pdf_guide > 0 ? g * pdf_guide : (1 - g) * pdf_bsdf;
   }
 };
 
-/// Directions that failed are no samples of the control.
+/// Failed directions are left out of the control variate.
 struct FailedForgotten : GuidedParts {
   static constexpr bool kCountFailed = false;
 };
-/// Coefficients of another leaf than those whose sum is added, as after a split.
+/// Coefficients come from another leaf than their sum, as after a split.
 struct OtherCoefficients : GuidedParts {
   static uint32_t direction_cell(uint32_t cell, uint32_t n_cells) { return (cell + 1) % n_cells; }
 };
@@ -78,7 +78,7 @@ TestScene trained(const std::string& xml, const GuideSettings& options) {
   return scene;
 }
 
-/// The field that another scene's integrator has learnt, used with a bug.
+/// The field that another scene's integrator learnt, used with a planted bug.
 template <typename Parts>
 TestScene with_bug(const std::string& xml, const GuideSettings& options, const TestScene& learnt) {
   TestScene scene = guided<Parts>(xml, options);
@@ -133,13 +133,13 @@ TEST(GuidedPath, ControlledAgreesWithPathWithoutLightSamples) {
   const TestScene path = load_text(xml), scene = trained(xml, controlled(false));
   EXPECT_GE(integrator_of(scene).table().n_cells(), 2u);
   EXPECT_EQ(n_biased(differences(scene, path, 32, 100)), 0);
-  // With the same numbers only the control differs.
+  // With the same random numbers, only the control variate differs.
   EXPECT_GT(n_biased(differences(with_bug<FailedForgotten>(xml, controlled(false), scene), scene, 16, 0)), 0);
   EXPECT_GT(n_biased(differences(with_bug<OtherCoefficients>(xml, controlled(false), scene), scene, 16, 0)), 0);
 }
 
 TEST(GuidedPath, ControlRestoresThePerfectTechnique) {
-  // The BSDF samples a uniform sky without noise; guiding adds noise, which the control takes away.
+  // BSDF sampling of a uniform sky has no noise; guiding adds noise, which the control variate removes.
   const std::string wall = rectangle("<scale value='20'/><rotate x='1' angle='180'/><translate z='5'/>",
                                      "<bsdf type='diffuse'><rgb name='reflectance' value='0.6,0.5,0.3'/></bsdf>");
   const std::string sky = "<emitter type='constant'><rgb name='radiance' value='1,2,4'/></emitter>";

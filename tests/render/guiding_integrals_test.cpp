@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Control variates on guiding lobes for single integrals [Hua2023] (Figs. 3, 5 and 6): the irradiance of a matt plane
-// under the skies of scenes/skies, half of the directions from the BSDF. Lobes and coefficients are learnt from 49,152
-// samples each. Noise is the mean over 1,024 pixels of the squared difference of two renders, so a ratio of noises has
-// a standard error of about 6 %; seeds are fixed.
+// Control variates on guiding lobes for single integrals [Hua2023] (Figs. 3, 5 and 6): the irradiance of a diffuse
+// plane under the skies of scenes/skies, with half of the directions from the BSDF. Lobes and coefficients are each
+// learnt from 49,152 samples. Noise is the mean over 1,024 pixels of the squared difference of two renders, so a ratio
+// of noises has a standard error of about 6 %; seeds are fixed.
 #include <memory>
 #include <string>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light passes: the image of light tracing, its bits, and what cannot be used. With the light tracer of tests/support.
+// Light passes with the light tracer of tests/support: expected images, identical bits, and invalid splats.
 #include "passes/light_pass.h"
 
 #include <tbb/global_control.h>
@@ -19,7 +19,7 @@ namespace {
 
 using test_support::corner_text, test_support::LightTracer;
 
-/// The scene with a light tracer of all pixels of its film; LightTracing::kOff gives `path`.
+/// The scene with a light tracer for all pixels of its film; LightTracing::kOff gives `path`.
 TestScene light_scene(const std::string& text, LightTracing mode = LightTracing::kOn, float share = 1) {
   TestScene scene = load_text(text, 0, [&](PathLengthSettings lengths) {
     lengths.max_depth = 4, lengths.rr_depth = PathLengthSettings::kUnlimited;
@@ -44,8 +44,8 @@ Film light_film(const TestScene& scene, uint32_t bundles, int groups, uint64_t s
   return film;
 }
 
-/// Compares two films of many groups: the mean square of the differences of pixels, each divided by its standard
-/// error (about 1 where only noise differs), the largest of them, and the same for the mean of the image.
+/// Compares two films with many groups: the mean square of the pixels' differences over their standard errors (about 1
+/// if only noise differs), the largest of them, and the same for the image mean.
 struct Difference {
   double mean_square = 0, largest = 0, image = 0;
 };
@@ -142,7 +142,7 @@ TEST(LightPass, InterruptionsLeaveNoTrace) {
   int interruptions = 0;
   for (bool complete = false; !complete;) {
     std::atomic<bool> stop{false};
-    std::atomic<int> left{static_cast<int>(random() % 250)};  // bundles; the largest round has 144
+    std::atomic<int> left{static_cast<int>(random() % 250)};  // bundles until the stop; the largest round has 144
     PassSettings settings = light_settings(scene, 240);
     settings.stop = &stop;
     settings.progress = [&](uint64_t, uint64_t) {
@@ -164,7 +164,7 @@ TEST(LightPass, EndsWhenTimeIsOver) {
   const TestScene scene = light_scene(corner_text(16, 12, "box"));
   Film film = new_film(scene);
   PassSettings settings = light_settings(scene, 4000);
-  settings.seconds = 1e-9;  // is over when the first bundle is done, however fast
+  settings.seconds = 1e-9;  // over when the first bundle is done, however fast
   EXPECT_FALSE(render_light_pass(scene.scene(), tracer(scene), settings, film).complete);
   EXPECT_LT(light_paths(film), 4000u * kBundlePaths);
 }
@@ -185,7 +185,7 @@ TEST(LightPass, ReplayListsThePathsSplats) {
   EXPECT_TRUE(same_bits(film, replayed));
 }
 
-/// Splats of which some cannot be used, in no order of paths.
+/// Produces splats, some of them invalid, in an arbitrary order of paths.
 class BadSplats final : public LightTracingIntegrator {
  public:
   BadSplats() : LightTracingIntegrator({}) {}

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Participating media under `path`, in scenes whose result is known in closed form.
+// Participating media in `path`, in scenes with closed-form solutions.
 //
-// Statistical cases: the pixels of one render with independent samples are N independent values with one expectation
-// (the camera's angle is so small that all see the same); Student's t-test at alpha = 5e-7. Each case plants a
-// relative error into the expected value, 3 % where none is named, asserts that its N detects half of that with power
-// 0.99, and that the test rejects it.
+// Statistical cases: the pixels of a render with independent samples are N independent values with the same expectation
+// (the field of view is so small that all see the same); Student's t-test at alpha = 5e-7. Each case plants a relative
+// error of the expected value, 3 % by default, and asserts that its N detects half of that with power 0.99 and that the
+// test rejects it.
 #include <tbb/global_control.h>
 
 #include <cmath>
@@ -30,7 +30,7 @@ std::string medium(const std::string& extinction, const std::string& albedo, con
          extinction + "'/><rgb name='albedo' value='" + albedo + "'/>" + phase + "</medium>";
 }
 
-/// A medium whose extinction along z is given by cells over z in [4, 6], all multiplied by 2.
+/// A medium whose extinction is twice the values of cells along z in [4, 6].
 std::string grid_medium(const std::vector<float>& cells, const std::string& albedo, int channels = 1,
                         const std::string& phase = "") {
   const std::string file = test_support::test_file("grid.vol");
@@ -46,7 +46,7 @@ std::string grid_medium(const std::vector<float>& cells, const std::string& albe
          albedo + "'/>" + phase + "</medium>";
 }
 
-/// The box [-1, 1]² x [4, 6].
+/// The box [-1, 1]² x [4, 6] filled with a medium.
 std::string box(const std::string& inside, const std::string& boundary = kBoundary) {
   return "<shape type='cube'><transform name='to_world'><translate z='5'/></transform>" + boundary + inside +
          "</shape>";
@@ -76,8 +76,8 @@ void expect_mean(const Film& film, int channel, double expected, double planted 
   EXPECT_FALSE(statistics::t_test(values, expected * (1 - planted)).accepted);
 }
 
-// Without scattering, the wall is attenuated exponentially by the medium in front of it; distances are sampled for one
-// channel and used for all.
+// Without scattering, the medium attenuates the wall behind it exponentially; distances are sampled by one channel and
+// used for all.
 TEST(Media, AbsorptionIsExponential) {
   const Film film = render(load(box(medium("0.05, 0.2, 0.5", "0")) + kLitWall), 1024, 1);
   for (int c = 0; c < 3; ++c) {
@@ -86,7 +86,7 @@ TEST(Media, AbsorptionIsExponential) {
   }
 }
 
-TEST(Media, AGridAbsorbsItsIntegral) {  // cells of 2/3, extinctions of 2 · (0.1, 0.7, 0.3)
+TEST(Media, AGridAbsorbsItsIntegral) {  // cells of size 2/3 with extinctions of 2 · (0.1, 0.7, 0.3)
   const Film film = render(load(box(grid_medium({0.1f, 0.7f, 0.3f}, "0")) + kLitWall), 1024, 2);
   expect_mean(film, 1, 2 * std::exp(-2 * 1.1 * 2 / 3));
 }
@@ -99,7 +99,7 @@ TEST(Media, AColouredGridAbsorbsItsIntegrals) {
   }
 }
 
-// A lamp at the camera lights a diffuse wall through the box: light samples cross two boundaries and the medium.
+// A light at the camera illuminates a diffuse wall through the box: light samples cross two boundaries and the medium.
 TEST(Media, LightSamplesSeeThroughBoundaries) {
   const std::string lamp =
       "<emitter type='point'><point name='position' x='0' y='0' z='3.5'/><rgb name='intensity' "
@@ -110,7 +110,7 @@ TEST(Media, LightSamplesSeeThroughBoundaries) {
   expect_mean(render(load(box(grid_medium({0.05f, 0.15f}, "0")) + body, 2), 256, 5), 0, unhidden * std::exp(-2 * 0.4));
 }
 
-// Under a uniform sky of radiance 1, a medium that scatters without absorption is invisible.
+// In a uniform environment of radiance 1, a medium with albedo 1 is invisible.
 TEST(Media, WhatScattersEverythingIsInvisible) {
   const std::string forwards = "<phase type='hg'><float name='g' value='0.7'/></phase>";
   for (const std::string& inside :
@@ -126,7 +126,7 @@ const std::string kMask =
     "value='0'/></bsdf></bsdf>";
 const std::string kPane = "<bsdf type='thindielectric'><float name='int_ior' value='1.5'/></bsdf>";
 
-// The lamp at the camera again, which directions never find: its light crosses two surfaces there and two back.
+// The light at the camera again, which direction samples never find: its light crosses two surfaces each way.
 TEST(Media, LightSamplesSeeThroughMasksAndPanes) {
   const std::string lamp =
       "<emitter type='point'><point name='position' x='0' y='0' z='3.5'/><rgb name='intensity' "
@@ -138,7 +138,7 @@ TEST(Media, LightSamplesSeeThroughMasksAndPanes) {
   expect_mean(render(load(box(medium("0.1", "0"), kPane) + body, 2), 512, 5), 0, unhidden * std::pow(pane, 4));
 }
 
-// Panes reflect what they do not let pass, so nothing is lost, and the weights of both techniques add up to 1.
+// Panes reflect what they do not transmit, so no light is lost, and the weights of both techniques add up to 1.
 TEST(Media, WhatScattersEverythingBehindPanesIsInvisible) {
   for (const std::string& inside : {medium("0.6", "1"), medium("0.1, 0.4, 1", "1")}) {
     const Film film = render(load(box(inside, kPane) + kSky), 256, 6);
@@ -158,7 +158,7 @@ TEST(Media, WithoutLightSamplesToo) {
   expect_mean(render(load(box(inside) + kSky), 128, 6), 1, 1);
 }
 
-// The camera stands in fog without end: each collision keeps half of the light, and there is none but a lamp around.
+// The camera is in unbounded, purely absorbing fog, at the centre of a spherical light.
 TEST(Media, TheCameraMayStandInOne) {
   const std::string lamp =
       "<shape type='sphere'><float name='radius' value='4'/><boolean name='flip_normals' "
@@ -170,7 +170,7 @@ TEST(Media, TheCameraMayStandInOne) {
   expect_mean(render(scene, 512, 7), 1, std::exp(-1));
 }
 
-// A grid of one value is a homogeneous medium: the same numbers, and means whose difference is noise.
+// A grid with one value is a homogeneous medium: means with the same random numbers differ only by noise.
 TEST(Media, AGridOfOneValueIsHomogeneous) {
   const std::string lamp = "<emitter type='point'><point name='position' x='2' y='1' z='4'/></emitter>";
   const TestScene even = load(box(medium("0.8", "0.9")) + kSky + lamp);
@@ -196,7 +196,7 @@ TEST(Media, SingleLengthsAddUpToTheWhole) {
   for (int i = 0; i < 1024; ++i) EXPECT_NEAR(sums[i], whole.mean(i % 32, i / 32).g, 1e-4);
 }
 
-// Nothing but a boundary is met before the light: its emission is that of paths of one edge.
+// A boundary before the light is not a vertex: the light's emission belongs to paths of one edge.
 TEST(Media, BoundariesAreNoEdges) {
   const Film film = render(load(box(medium("0", "0")) + kLitWall, 1), 1, 1);
   EXPECT_EQ(film.mean(3, 5), Spectrum(1, 2, 3));
@@ -224,7 +224,7 @@ TEST(Media, BitsDoNotDependOnThreads) {
     }
 }
 
-// Pixels that see the same have the same samples with common random numbers, however often their paths collide.
+// With common random numbers, pixels that see the same have the same samples, however often their paths collide.
 TEST(Media, CommonRandomNumbersGiveEqualPixels) {
   const TestScene scene = load(box(grid_medium({0.3f, 0.9f, 0.4f}, "0.8, 0.9, 0.7")) + kSky);
   const auto spread = [&](Sampling sampling) {

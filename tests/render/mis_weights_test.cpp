@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The weights of all techniques that find a path sum to one, in the program itself: at vertices of random paths the
-// direction sample is made to go where the light sample of that vertex went, so that the same path is found by both
-// techniques, and the weights that the tracer computes for each are added. With roulette from the first edge, delta
-// lights and delta lobes. Exact up to rounding; no statistics.
+// The weights of all techniques that find a path sum to one, in the path tracer itself: at vertices of random paths,
+// the direction sample is replaced by the direction of the light sample, so that both techniques find the same path,
+// and the weights that the tracer computes for each are added. With Russian roulette from the first edge, delta lights
+// and delta lobes. Exact up to rounding; no statistics.
 #include <optional>
 
 #include "integrators/path_tracer.h"
@@ -14,19 +14,19 @@ namespace {
 enum class Bug {
   kNone,
   kDirectionsNotWeighted,
-  kLightPmfForgotten,  ///< by one of the techniques
+  kLightPmfForgotten,  ///< in one of the techniques
   kRouletteInOneWeight,
-  kDeltaLightWeighted,  ///< as if a direction sample could find it
+  kDeltaLightWeighted,  ///< as if direction samples could find it
 };
 
-/// What happened to the paths.
+/// Records of the traced paths.
 struct Log {
   std::vector<double> sums;           ///< of the weights of both techniques for one path
   std::vector<double> delta_weights;  ///< of light samples of delta lights
-  int n_sums_after_refraction = 0;    ///< where a delta lobe came before
+  int n_sums_after_refraction = 0;    ///< sums after a delta lobe
 
-  // Of the path that is being traced.
-  std::optional<double> light_weight;  // at the vertex that is evaluated
+  // State of the current path.
+  std::optional<double> light_weight;  // at the current vertex
   std::optional<double> to_be_added;   // of the vertex whose direction sample follows the light sample
   float survival = 1;
   bool met_delta = false;
@@ -86,7 +86,7 @@ struct LoggingParts : PathParts {
   }
 };
 
-/// A room of several reflectance models with lights of every kind.
+/// A room with several BSDFs and every kind of light.
 std::string lights_and_materials() {
   const auto rectangle = [](const char* transform, const char* content) {
     return std::string("<shape type='rectangle'><transform name='to_world'>") + transform + "</transform>" + content +
@@ -112,7 +112,7 @@ std::string lights_and_materials() {
       24, 24, -1, "", "<integer name='rr_depth' value='1'/>");
 }
 
-/// Traces 8 paths of each pixel, one at a time.
+/// Traces 8 paths per pixel, one at a time.
 Log trace(Bug bug) {
   Log log;
   const TestScene scene = load_text(lights_and_materials(), 0, [&](const PathLengthSettings& lengths) {
@@ -142,7 +142,7 @@ TEST(MisWeights, SumToOneAlongPaths) {
   EXPECT_GT(log.sums.size(), 500u);
   EXPECT_GT(log.n_sums_after_refraction, 50);
   EXPECT_GT(log.delta_weights.size(), 500u);
-  // The density of the point that a ray finds differs from that of the point sampled by rounding.
+  // The densities of the point that a ray finds and of the sampled point differ by rounding.
   EXPECT_LT(worst(log.sums), 1e-2);
   EXPECT_LT(worst(log.delta_weights), 1e-6);
 }

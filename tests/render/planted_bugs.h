@@ -8,14 +8,14 @@ namespace covary {
 
 enum class Bug {
   kNone,
-  kNoDirectionWeight,   ///< light that direction samples find is not weighted against light samples
-  kNoLightWeight,       ///< and the other way round
-  kSurvivorsNotRaised,  ///< roulette without its weight
-  kRadianceNotScaled,   ///< the squared ratio of indices is forgotten where light enters another medium
+  kNoDirectionWeight,   ///< direction samples have no MIS weight
+  kNoLightWeight,       ///< light samples have no MIS weight
+  kSurvivorsNotRaised,  ///< survivors of Russian roulette are not divided by their probability
+  kRadianceNotScaled,   ///< radiance is not scaled by the squared ratio of indices in refraction
   kLightPmfForgotten,   ///< light samples are not divided by the probability of their light
   kCosineForgotten,     ///< reflected light is not multiplied by the cosine
   kLobePmfForgotten,    ///< direction samples are not divided by the probability of their lobe
-  kNotANumber,          ///< direction samples have a weight that is none
+  kNotANumber,          ///< direction samples have a weight of NaN
 };
 
 inline const char* name_of(Bug bug) {
@@ -40,7 +40,7 @@ class LightsWithBug : public UniformLights {
   bool forgotten_;
 };
 
-/// The parts of `path`, one of them wrong; with kNone they give the bits of `path`.
+/// The parts of `path`, one with a planted bug; kNone gives the bits of `path`.
 struct PartsWithBug : PathParts {
   Bug bug = Bug::kNone;
 

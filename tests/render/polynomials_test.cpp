@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Polynomial control variates in a render: the samples and coordinates of real pixels, exactness, bits, noise.
+// Polynomial control variates in renders: samples and coordinates of real pixels, exactness, identical bits, noise.
 #include "estimators/polynomials.h"
 
 #include <tbb/global_control.h>
@@ -16,7 +16,7 @@
 namespace covary {
 namespace {
 
-/// As the program fits them.
+/// The same fit as in a render.
 PixelEstimate estimate(int dimensions) {
   return [dimensions](std::span<const CameraSample> samples) {
     std::vector<Spectrum> values;
@@ -40,7 +40,7 @@ Film render(const TestScene& scene, const Integrator& integrator, const PassSett
   return film;
 }
 
-/// A wall lit by a small rectangle that the camera does not see: direct light is smooth in all numbers of light
+/// A wall lit by a small rectangle that the camera does not see: direct light is smooth in all random numbers of light
 /// sampling.
 TestScene lit_wall(int width, int height) {
   return load_text(scene_text(
@@ -52,10 +52,10 @@ TestScene lit_wall(int width, int height) {
       width, height, 2, "<float name='fov' value='20'/>"));
 }
 
-/// Radiance that is a polynomial of degree 2 in the six numbers, read at the addresses where a path reads them.
+/// Radiance is a polynomial of degree 2 in six random numbers, at the addresses that a path uses.
 class PolynomialIntegrator final : public Integrator {
  public:
-  /// `with_bad`: one sample in 64 is not a number.
+  /// `with_bad`: one sample in 64 is NaN.
   explicit PolynomialIntegrator(bool with_bad = false) : with_bad_(with_bad) {}
   std::shared_ptr<Integrator> clone() const override { return std::make_shared<PolynomialIntegrator>(with_bad_); }
   void trace(const Scene&, std::span<CameraSample> samples, PathContext&) const override {
@@ -87,7 +87,7 @@ TEST(PolynomialsInARender, EveryPixelIsExactWhereRadianceIsAPolynomial) {
   const Film film = render(scene, PolynomialIntegrator(), pass(scene, 192, 6));
   EXPECT_LT(largest_difference(film, PolynomialIntegrator::integral()), 2e-6);
   for (uint32_t count : film.counts()) EXPECT_EQ(count, 192u);
-  // With fewer numbers than it depends on it is not.
+  // With fewer coordinates than the radiance depends on, it is not exact.
   EXPECT_GT(
       largest_difference(render(scene, PolynomialIntegrator(), pass(scene, 192, 4)), PolynomialIntegrator::integral()),
       0.01);
@@ -169,7 +169,7 @@ TEST(PolynomialsInARender, InterruptedAndContinued) {
   for (bool complete = false; !complete; ++interruptions) {
     PassSettings settings = pass(scene, 40, 4);
     std::atomic<bool> stop{false};
-    std::atomic<int> left{4};  // of 15 tiles
+    std::atomic<int> left{4};  // tiles until the stop, of 15
     settings.stop = &stop;
     settings.progress = [&](uint64_t, uint64_t) {
       if (--left <= 0) stop = true;
@@ -205,7 +205,7 @@ TEST(PolynomialsInARender, CheckpointsComeBetweenTiles) {
 
 // ---- noise ---------------------------------------------------------------------------------------------------------
 
-/// Mean squared error of all pixels against `exact`, over 32 renders; and their image means.
+/// Mean squared error of all pixels against `exact` over 32 renders; `means`, if given, receives their image means.
 double squared_error(const TestScene& scene, const PassSettings& settings, const Film& exact,
                      std::vector<double>* means = nullptr) {
   double sum = 0;
@@ -220,10 +220,10 @@ double squared_error(const TestScene& scene, const PassSettings& settings, const
   return sum / (32.0 * exact.width() * exact.height());
 }
 
-// N = 32 renders of 96 pixels with 64 samples, Student's t-test at alpha = 5e-7 of the difference that the fit makes
-// to the image mean, whose expectation is zero up to the bias of O(1/n). With the standard error s of the 32
-// differences it detects 8.8 s with power 0.99, which is asserted to be below 1 % of the mean. Planted bugs: the
-// coordinates of another sample, which must not help, and coordinates of another range, which must shift the mean.
+// N = 32 renders of 96 pixels with 64 samples, Student's t-test at alpha = 5e-7 of the change of the image mean by the
+// fit, whose expectation is zero up to a bias of O(1/n). With the standard error s of the mean of the 32 changes, it
+// detects 8.8 s with power 0.99; the test asserts that this is below 1 % of the mean. Planted bugs: coordinates of
+// another sample, which must not help, and coordinates in another range, which must shift the mean.
 TEST(PolynomialsInARender, DirectLightHasLessNoiseAndTheRightMean) {
   const TestScene scene = lit_wall(12, 8);
   const Film exact = render(scene, 1 << 15, 1);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bidirectional path tracing in its plainest form, for comparison: one sample at a time, whole paths, densities and
-// contributions written out vertex by vertex. It reads the numbers of the same addresses as `bdpt`, so each technique
-// must find the same path with the same value and weight. Without roulette.
+// Reference bidirectional path tracer: one sample at a time, whole paths, with explicit densities and contributions of
+// all vertices. It uses the random numbers of `bdpt`, so each technique must find the same path with the same value and
+// weight. Without Russian roulette.
 //
 // Vertices of a whole path run from the light, x[0], to the lens, x[k].
 #pragma once
@@ -20,7 +20,7 @@
 
 namespace covary::reference_bdpt {
 
-/// What a technique (s, t) adds, before its weight, and its weight.
+/// The unweighted contribution of a technique (s, t), and its MIS weight.
 struct Contribution {
   Spectrum value;
   double weight = 0;
@@ -35,11 +35,11 @@ struct Settings {
 };
 
 struct Vertex {
-  SurfaceHit hit;                  // surfaces; p and ng also of a point on a light
+  SurfaceHit hit;                  // for surfaces; p and ng also for a point on a light
   const Emitter* light = nullptr;  // x[0] only
   Vec3 to_light;                   // x[0] at infinity: direction towards it
-  bool on_surface = false;         // not light alone, nor lens
-  // The event that leads on, if a walk drew one.
+  bool on_surface = false;         // neither the lens nor only a light
+  // The event to the next vertex, if a walk sampled one.
   std::optional<BsdfSample> event;
   bool from_camera = false;
 };
@@ -68,7 +68,7 @@ class Sampler {
     return result;
   }
 
-  /// The techniques (s, 1) of a light path; box filter.
+  /// The techniques (s, 1) of a light path, by pixel; box filter.
   std::map<int, std::pair<Vec2, Contribution>> light_path(const PathRandom& random) const {
     std::map<int, std::pair<Vec2, Contribution>> result;
     const std::vector<Vertex> light = light_walk(random.subpath(Subpath::kLight));
@@ -169,7 +169,7 @@ class Sampler {
     return path;
   }
 
-  /// Draws the event at v and the ray that leaves it.
+  /// Samples the event at v and the ray that leaves it.
   static bool step(Vertex& v, const Vec3& wo_world, TransportMode mode, const PathRandom& random, uint32_t vertex,
                    Ray& ray) {
     const Vec3 wo = local(v, wo_world);
@@ -242,11 +242,11 @@ class Sampler {
 
   // --- densities and contributions -----------------------------------------------------------------------------------
 
-  /// Densities of each vertex, sampled from the light's side and from the camera's, per unit area (a light at infinity:
-  /// per unit solid angle); a density of vertices behind delta events is relative to one Dirac delta for both sides.
+  /// Densities of each vertex, sampled from the light and from the camera, per unit area (a light at infinity: per unit
+  /// solid angle); after a delta event, both are relative to the same Dirac delta.
   struct Densities {
     std::vector<double> from_light, from_camera;
-    double direct = 0;  // of x[0] as a light sample
+    double direct = 0;  // density of x[0] as a light sample
   };
 
   static bool infinite(const Vertex& v) { return v.light && v.light->is_infinite(); }
@@ -264,19 +264,19 @@ class Sampler {
     return v.hit.bsdf->bind(v.hit, wo.z > 0, mode, arena_);
   }
 
-  /// Density of the direction to `next`, arriving from `previous`.
+  /// Density of the direction to `next` at v, arriving from `previous`; per unit solid angle.
   double direction_pdf(const Vertex& previous, const Vertex& v, const Vertex& next, bool from_camera) const {
     const Vec3 wo = local(v, towards(v, previous)), wi = local(v, towards(v, next));
     const TransportMode mode = from_camera ? TransportMode::kRadiance : TransportMode::kImportance;
     if (!v.event || !v.event->is_delta()) return bind(v, wo, mode)->eval(wo, wi).pdf_solid_angle;
     double pdf = v.event->pdf;
     if (v.from_camera != from_camera) {
-      // The event was drawn by the other side, for wi.
+      // The other side sampled the event, for wi.
       const TransportMode other = from_camera ? TransportMode::kImportance : TransportMode::kRadiance;
       pdf = bind(v, wi, other)->reverse_pmf(wi, *v.event);
     }
     if (from_camera || v.event->eta == 1) return pdf;
-    // d(omega at the light's side) / d(omega at the camera's side), with which the Dirac deltas of both sides differ.
+    // d(omega on the light's side) / d(omega on the camera's side), the ratio of both sides' Dirac deltas.
     const double eta = v.from_camera ? v.event->eta : 1 / v.event->eta;  // light's side over camera's
     return pdf * std::abs(wi.z / (wo.z * eta * eta));
   }
@@ -310,12 +310,12 @@ class Sampler {
       d.from_camera[i] = direction_pdf(x[i + 2], x[i + 1], x[i], true) * area_factor(x[i + 1], x[i]);
     return d;
   }
-  /// Density per area at b for one per solid angle at a.
+  /// Converts a density per unit solid angle at a to one per unit area at b.
   double area_factor(const Vertex& a, const Vertex& b) const {
     return infinite(b) ? 1 : cosine(b, towards(a, b)) / distance2(a, b);
   }
 
-  /// Density of the path for technique s; 0 where it cannot find it.
+  /// Density of the path for technique s; 0 if it cannot find the path.
   double density(const Path& x, const Densities& d, int s) const {
     const int k = static_cast<int>(x.size()) - 1, t = k + 1 - s;
     const auto smooth = [&](int i) { return !x[i].event || !x[i].event->is_delta(); };
@@ -328,7 +328,7 @@ class Sampler {
     return p;
   }
 
-  /// Radiance-times-importance of the whole path, per product of areas, without visibility.
+  /// Measurement contribution of the whole path, per product of areas, without visibility.
   Spectrum contribution(const Path& x) const {
     const size_t k = x.size() - 1;
     const Emitter& light = *x[0].light;
@@ -345,17 +345,17 @@ class Sampler {
       value = light.surface_radiance(x[0].hit, w);
       geometry *= cosine(x[0], w);
     }
-    for (size_t i = 0; i < k; ++i) {  // the edge from x[i] to x[i + 1]: its distance, and the cosine at x[i + 1]
+    for (size_t i = 0; i < k; ++i) {  // the edge from x[i] to x[i + 1]: its length, and the cosine at x[i + 1]
       const Vec3 edge = towards(x[i], x[i + 1]);
       if (!infinite(x[i])) geometry /= distance2(x[i], x[i + 1]);
       if (i + 1 == k) break;
       const Vertex& v = x[i + 1];
       const Vec3 to_light = -edge, to_camera = towards(v, x[i + 2]);
       value *= scattered(v, to_camera, to_light) * static_cast<float>(cosine(v, to_camera));
-      // scattered() has the cosine of the light's side.
+      // scattered() includes the cosine on the light's side.
     }
     const Vec3 out = towards(x[k], x[k - 1]);
-    // Importance times the cosine at the lens is a density of directions over the film.
+    // Importance times the cosine at the lens is the density of directions over the film.
     return value * static_cast<float>(geometry) * (scene_.camera().pdf_direction(out) * scene_.camera().pdf_position());
   }
 
@@ -365,7 +365,7 @@ class Sampler {
     const BsdfClosure* bsdf = bind(v, wo, TransportMode::kRadiance);
     if (!v.event || !v.event->is_delta()) return bsdf->eval(wo, wi).value;
     if (v.from_camera) return v.event->weight * v.event->pdf;
-    for (int i = 0; i < 1024; ++i) {  // the lobe as the camera's side draws it
+    for (int i = 0; i < 1024; ++i) {  // the lobe as the camera's side samples it
       const BsdfSample s = bsdf->sample(wo, (static_cast<float>(i) + 0.5f) / 1024, {0.5f, 0.5f});
       if (s.valid() && s.is_delta() && s.lobe == v.event->lobe && length_squared(s.wi - wi) < 1e-4f)
         return s.weight * s.pdf;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Renders of small scenes given as text, for tests across the whole renderer.
+// Renders small scenes given as text, for tests of the whole renderer.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ inline TestScene load_file(const std::string& file, const LoadOptions& options) 
   return scene;
 }
 
-/// The integrator that a scene names, with its own settings.
+/// The integrator that a scene specifies, with the scene's settings.
 inline std::shared_ptr<Integrator> scene_integrator(Parameters& parameters, const PathLengthSettings& lengths) {
   for (const IntegratorPlugin& plugin : integrator_plugins())
     if (parameters.type() == plugin.name) {
@@ -48,7 +48,7 @@ inline std::shared_ptr<Integrator> scene_integrator(Parameters& parameters) {
 
 using MakeIntegrator = std::function<std::shared_ptr<Integrator>(const PathLengthSettings&)>;
 
-/// `min_depth` as on the command line. `make`, where given, makes another integrator than the scene's.
+/// `min_depth` as on the command line. `make`, if given, makes an integrator to use instead of the scene's.
 inline TestScene load_text(const std::string& xml, int min_depth = 0, const MakeIntegrator& make = nullptr) {
   const std::string file = test_support::test_file("scene.xml");
   std::ofstream(file) << xml;
@@ -61,8 +61,8 @@ inline TestScene load_text(const std::string& xml, int min_depth = 0, const Make
   return load_file(file, options);
 }
 
-/// A scene of the given body: path integrator, box filter, camera at the origin looking along +z unless `sensor` says
-/// otherwise.
+/// A scene around `body`: path integrator, box filter, and a camera at the origin that looks along +z unless `sensor`
+/// says otherwise.
 inline std::string scene_text(const std::string& body, int width, int height, int max_depth = -1,
                               const std::string& sensor = "", const std::string& integrator = "") {
   return "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='" +

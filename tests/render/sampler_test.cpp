@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Renders with Sobol' points: the same expected image with less noise, groups that know nothing of each other, and
-// samples whose numbers follow from their address.
+// Renders with Sobol' points: the same expected image with less noise, uncorrelated groups, and random numbers that
+// follow from a sample's address.
 #include "unbiased_images.h"
 
 namespace covary {
@@ -11,7 +11,7 @@ Film sobol(const TestScene& scene, uint32_t spp, uint64_t seed, int groups,
   return render(scene, spp, seed, sampling, groups, Sampler::kSobol);
 }
 
-// 16 seeds, t-tests of 16 blocks and of the whole, alpha = 5e-7. Planted bug: an image that is 5 % too bright.
+// 16 seeds, t-tests of 16 blocks and of the whole image, alpha = 5e-7. Planted bug: an image that is 5 % too bright.
 TEST(Samplers, SobolPointsGiveTheSameExpectedImage) {
   const TestScene scene = load_text(everything());
   const auto independent = [&](uint64_t seed) { return render(scene, 12, seed + 100).mean_image(); };
@@ -29,7 +29,7 @@ TEST(Samplers, SobolPointsGiveTheSameExpectedImage) {
   EXPECT_GT(n_biased(differences(brighter, independent)), 0);
 }
 
-/// Sum over pixels of the squared difference of two renders of different seeds: twice the variance.
+/// Sum over pixels of the squared difference between two renders with different seeds: twice the variance.
 double squared_difference(const Film& a, const Film& b) {
   double sum = 0;
   for (int y = 0; y < kSide; ++y)
@@ -44,8 +44,8 @@ TEST(Samplers, SobolPointsHaveLessNoise) {
   EXPECT_LT(squared_difference(sobol(scene, 64, 1, 1), sobol(scene, 64, 2, 1)), 0.8 * independent);
 }
 
-// Twice the covariance of groups g and h is the mean of (a_g - b_g)(a_h - b_h) over pixels of two renders a, b, which
-// are independent. 1,024 pixels, alpha = 5e-7: detects a correlation of 0.23. Planted bug: one group twice.
+// The mean of (a_g - b_g)(a_h - b_h) over pixels of two independent renders a, b is twice the covariance of groups g
+// and h. 1,024 pixels, alpha = 5e-7: detects a correlation of 0.23. Planted bug: one group used twice.
 TEST(Samplers, GroupsAreUncorrelated) {
   const TestScene scene = load_text(everything());
   constexpr int kGroups = 6;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Integrators that learn: identical bits for any number of threads, a description that distinguishes trainings, and
-// passes that reject mixtures of them. Uses a small integrator whose sums depend on the order of addition.
+// Integrators that learn: identical bits for any number of threads, descriptions that distinguish trainings, and passes
+// that reject mixtures of them. Uses a small integrator whose sums depend on the order of addition.
 #include "passes/training.h"
 
 #include <tbb/global_control.h>
@@ -22,8 +22,7 @@ using test_support::message_of;
 const std::string kRoom = std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml";
 constexpr uint32_t kCells = 50;
 
-/// Adds noise of mean zero to paths, as strong as the mean radiance that was learnt for the direction of the camera
-/// ray.
+/// Adds noise with mean zero to paths, proportional to the mean radiance learnt for the camera ray's direction.
 class CellMeans final : public LearningIntegrator {
  public:
   CellMeans(std::shared_ptr<Integrator> inner, uint32_t spp) : inner_(std::move(inner)), spp_(spp) {}
@@ -114,13 +113,13 @@ TestScene load_room() {
 
 CellMeans& learner(const TestScene& scene) { return dynamic_cast<CellMeans&>(*scene.loaded.integrator); }
 
-/// Trains the scene's integrator in the whole frame.
+/// Trains the scene's integrator on the whole frame.
 bool train_room(const TestScene& scene, uint64_t seed = 0, TrainingImage* image = nullptr) {
   return train(scene.scene(), learner(scene),
                {{0, 0, scene.loaded.width, scene.loaded.height}, scene.loaded.filter, nullptr, {}, {}, seed, image});
 }
 
-/// Samples for learning that stay in the film.
+/// Settings of training samples that stay in the film.
 PassSettings learning(const TestScene& scene, uint32_t spp) {
   PassSettings settings;
   settings.spp = spp, settings.seed = 7, settings.learner = &learner(scene);
@@ -184,7 +183,7 @@ TEST(Training, SamplesMayStayInTheFilm) {
 TEST(Training, NegativeSamplesStayWhereTheIntegratorAllowsThem) {
   const TestScene scene = load_room();
   train_room(scene);
-  const Film film = render(scene, 1, 7);  // expects that no sample is counted as bad
+  const Film film = render(scene, 1, 7);  // expects no bad samples
   EXPECT_LT(*std::min_element(film.data().begin(), film.data().end()), 0);
 }
 
@@ -217,13 +216,13 @@ TEST(Training, StoppedIsNotTrainedAndCanStartAgain) {
   TrainingSettings settings{{0, 0, scene.loaded.width, scene.loaded.height}, scene.loaded.filter, &stop, {}};
   int tiles = 0;
   settings.progress = [&](uint64_t, uint64_t) {
-    if (++tiles == 20) stop = true;  // of 15 in each wave
+    if (++tiles == 20) stop = true;  // a wave has 15
   };
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   EXPECT_FALSE(train(scene.scene(), learner(scene), settings));
   EXPECT_FALSE(learner(scene).frozen());
   EXPECT_EQ(learner(scene).trained_spp(), 1u);
-  // Trained again from the beginning it is as if nothing had been.
+  // Training again starts from scratch.
   EXPECT_TRUE(train_room(scene));
   EXPECT_TRUE(train_room(other));
   EXPECT_EQ(scene.integrator().description(), other.integrator().description());

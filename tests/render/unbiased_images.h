@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Do two integrators estimate the same image? Renders of many seeds, Student's t-test on the means of 16 blocks of the
-// image and of the whole. A scene with lights of every kind, and surfaces of many, to try it on.
+// Tests whether two integrators estimate the same image: renders with many seeds, Student's t-test on the means of 16
+// blocks and of the whole image; and a scene with every kind of light and many kinds of surfaces.
 #pragma once
 
 #include <cmath>
@@ -31,7 +31,7 @@ inline const std::string kMeshLight =
     "<shape type='cube'><transform name='to_world'><scale value='0.4'/><translate x='2' y='2' z='5'/></transform>"
     "<emitter type='area'><rgb name='radiance' value='8,2,1'/></emitter></shape>";
 
-/// Lights of every kind, those at a point or in one direction only if wanted, and surfaces of many.
+/// A scene with every kind of light, delta lights only if wanted, and many kinds of surfaces.
 inline std::string everything(const std::string& integrator = "<integer name='rr_depth' value='3'/>",
                               bool delta_lights = true) {
   const std::string points =
@@ -59,7 +59,7 @@ inline std::string everything(const std::string& integrator = "<integer name='rr
       kSide, kSide, 5, kWide, integrator);
 }
 
-/// Differences of block means, and at the end of the mean of the image, for each of 16 seeds.
+/// Differences of the block means and, last, of the image mean, for each of 16 seeds.
 using Differences = std::vector<std::vector<double>>;
 
 inline double block_mean(const Image& image, int block) {
@@ -72,7 +72,7 @@ inline double block_mean(const Image& image, int block) {
   return sum / (size * size);
 }
 
-/// Of the images that a and b make of each seed.
+/// Differences between the images of a and b for each seed.
 template <typename A, typename B>
 Differences differences(const A& a, const B& b) {
   Differences result(kBlocks * kBlocks + 1);
@@ -85,27 +85,27 @@ Differences differences(const A& a, const B& b) {
   return result;
 }
 
-/// `shift`: by how much the seeds of b differ from those of a.
+/// `shift`: seeds of b minus those of a.
 inline Differences differences(const TestScene& a, const TestScene& b, uint32_t spp, uint64_t shift) {
   return differences([&](uint64_t seed) { return render(a, spp, seed).mean_image(); },
                      [&](uint64_t seed) { return render(b, spp, seed + shift).mean_image(); });
 }
 
-/// Blocks whose difference has another mean than zero.
+/// Number of means, of blocks or of the image, whose difference is significant.
 inline int n_biased(const Differences& blocks) {
   int n = 0;
   for (const std::vector<double>& values : blocks) n += !statistics::t_test(values, 0).accepted;
   return n;
 }
 
-/// The smallest difference of the image's means that is found with power 0.99.
+/// The smallest difference of image means that is detected with power 0.99.
 inline double detectable(const Differences& blocks) {
   statistics::Moments moments;
   for (const double difference : blocks.back()) moments.add(difference);
   return statistics::smallest_detectable(std::sqrt(moments.sample_variance()), 16, statistics::test_alpha(), 0.99);
 }
 
-/// Sum of squared differences of two renders with other numbers: twice the variance.
+/// Sum of squared differences between two renders with different random numbers: twice the variance.
 inline double noise(const TestScene& scene) {
   const Film a = render(scene, 8, 1), b = render(scene, 8, 2);
   double sum = 0;
