@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Temporal accumulation: mixes previous frames into a frame where held-out samples show less error for it (ours).
 //
-// M: the frame's own mixture, with standard error s; s*: M times the median of s / M in 5 x 5 pixels; H: the history,
-// previous frames reprojected to this one, whose samples are independent of the frame's. The candidate is
+// M: the frame's own mixture, with standard error s; s*: M times the median of s / M over 5 x 5 pixels; H: the history,
+// previous frames reprojected to this one, with samples independent of the frame's. The candidate is
 //
 //     C = M + clamp(H - M, -k s*, k s*) / (1 + e / s'^2),     e: squared error of H from resampling between pixels,
 //                                                             s'^2: mean of s^2 over the channels,

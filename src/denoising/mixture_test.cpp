@@ -40,7 +40,7 @@ Image average(const Image& a, const Image& b) {
   return mean;
 }
 
-/// Independent images of two halves with this variance, and mixtures that they judge.
+/// Independent images of two halves with this variance, which determine the weights of mixtures.
 struct Experiment {
   static constexpr double kVariance = 0.04;  // of a half's independent image
   Moments independent[2];

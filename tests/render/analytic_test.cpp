@@ -251,7 +251,7 @@ TEST(HideEmitters, LightsAreInvisibleButShine) {
 }
 
 TEST(PlantedBugs, WithoutOneThePartsGiveTheBitsOfPath) {
-  // `path` samples spheres side by side where it sees them from outside.
+  // `path` samples spheres that it sees from outside several at a time.
   const std::string around =
       "<shape type='sphere'><float name='radius' value='90'/><boolean name='flip_normals' value='true'/>"
       "<emitter type='area'><rgb name='radiance' value='0.5'/></emitter></shape>";
