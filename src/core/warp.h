@@ -35,6 +35,12 @@ inline Vec3 square_to_sphere(Vec2 u) {
 }
 inline float sphere_pdf_solid_angle() { return 1 / (4 * kPi); }
 
+/// The direction of square_to_cone() above `d` on the unit disk. `one_minus_cos`: |d|^2 one_minus_cos_max, which is
+/// uniform in [0, one_minus_cos_max).
+inline Vec3 disk_to_cone(Vec2 d, float one_minus_cos, float one_minus_cos_max) {
+  const float scale = safe_sqrt(one_minus_cos_max * (2 - one_minus_cos));  // sin(theta) / |d|
+  return {d.x * scale, d.y * scale, 1 - one_minus_cos};
+}
 /// Uniform in the cone of directions around +z whose cosine is at least `cos_max`. Takes `one_minus_cos_max` because it
 /// is tiny for distant lights, and computing it from cos_max would cancel.
 inline Vec3 square_to_cone(Vec2 u, float one_minus_cos_max) {

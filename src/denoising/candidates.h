@@ -60,10 +60,12 @@ CandidateMaker::Make one_by_one(std::function<std::vector<Image>(const Candidate
 /// The image to denoise: that of a two-pass estimator, or the mean of independent samples.
 enum class CandidateBase { kPair, kMean };
 
-/// Candidates without a network. Copies the guides. `regression`: for a mean with albedo, use regression.h instead of
-/// NL-means of the image itself; it gains next to nothing if a network's candidates are mixed in too.
+/// NL-means of the image and of the image over its albedo; for a mean with albedo, regression.h in place of the former,
+/// or all three. The regression gains next to nothing if a network's candidates are mixed in too.
+enum class FilterKinds { kNlMeans, kRegression, kAll };
+/// Candidates without a network. Copies the guides.
 CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base = CandidateBase::kPair,
-                                   bool regression = false);
+                                   FilterKinds kinds = FilterKinds::kNlMeans);
 /// The guides for a neural network: those seen in mirrors and through glass, if available.
 Guides network_guides(const Guides& guides);
 /// Images denoised by a neural network. Throws like denoise().

@@ -35,6 +35,9 @@ std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>&
 /// The first candidate, an image with little noise.
 inline const Image& guide_of(const CandidateSet& set) { return set.candidates[0]; }
 
+/// Samples per pixel; without counts, one in each group.
+double mean_samples(const GroupedImage& image);
+
 /// Whether any candidates come from a neural network.
 bool has_network(const std::vector<CandidateMaker>& makers);
 
