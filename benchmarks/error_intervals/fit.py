@@ -168,9 +168,9 @@ inline constexpr FittedErrors kFittedToFew[] = {{
 }};
 // clang-format on
 
-/// There is no interval where the largest group of each pixel has a larger share of the light that is not common to all
-/// groups, the bounds are further off than this factor, a larger share of the noise is in mirrors or behind glass,
-/// fewer pixels hold the noise, or there are fewer groups and the kind has no fit for few.
+/// There is no interval if the largest group of each pixel has a larger fraction of the light that is not common to all
+/// groups, if the bounds are wider than this factor, if a larger fraction of the noise is in mirrors or behind glass,
+/// if fewer pixels hold the noise, or if there are fewer groups and the kind has no separate fit for few groups.
 inline constexpr double kMostOfLargest = {share}, kMostFactor = {factor}, kMostSpecular = {specular};
 inline constexpr int kFewestPixels = {fewest}, kFewestGroups = {groups};
 

@@ -45,8 +45,8 @@ inline constexpr FittedErrors kFittedToFew[] = {
 // clang-format on
 
 /// There is no interval if the largest group of each pixel has a larger fraction of the light that is not common to all
-/// groups, if the bounds are wider than this factor, if a larger fraction of the noise is in mirrors or behind glass, if
-/// fewer pixels hold the noise, or if there are fewer groups and the kind has no separate fit for few groups.
+/// groups, if the bounds are wider than this factor, if a larger fraction of the noise is in mirrors or behind glass,
+/// if fewer pixels hold the noise, or if there are fewer groups and the kind has no separate fit for few groups.
 inline constexpr double kMostOfLargest = 0.55, kMostFactor = 5, kMostSpecular = 0.5;
 inline constexpr int kFewestPixels = 20, kFewestGroups = 8;
 
