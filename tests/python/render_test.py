@@ -35,7 +35,7 @@ class Render(PackageTest):
         self.same(result, "--spp", 24, "--oidn", "off")
         self.assertEqual((sorted(result.films), result.estimator), (["independent"], "none --denoise auto --oidn off"))
         self.assertLess(result.predicted_relmse, result.risks["mean"])
-        self.assertEqual(("sharp" in result.risks, 0 <= result.bias_share < 1, result.network), (True, True, ""))
+        self.assertEqual(("regression" in result.risks, 0 <= result.bias_share < 1, result.network), (True, True, ""))
         self.assertEqual(covary.render(scene, spp=4, denoise="none").estimator, "none")
         result = covary.render(scene, 24, "iicv")
         self.same(result, "--spp", 24, "--estimator", "iicv")
