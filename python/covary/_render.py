@@ -219,9 +219,9 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     return RenderResult(**made)
 
 
-render.__doc__ = (render.__doc__ or "").replace("    {declared}\n", "".join(
-    textwrap.fill(f"{underscored(option['name'])}: {option['help']}.", 120, initial_indent=" " * 4,
-                  subsequent_indent=" " * 8) + "\n" for option in _covary.render_options()
+render.__doc__ = inspect.cleandoc(render.__doc__ or "").replace("{declared}\n", "".join(
+    textwrap.fill(f"{underscored(option['name'])}: {option['help']}.", 120, subsequent_indent=" " * 4) + "\n"
+    for option in _covary.render_options()
     if underscored(option["name"]) in _DECLARED.keys() - inspect.signature(inspect.unwrap(render)).parameters) + "\n")
 
 

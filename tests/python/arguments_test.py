@@ -252,9 +252,9 @@ class Arguments(PackageTest):
         self.assertEqual({other.get(name, name) for name in declared} - {"resolution"}, taken)
         self.assertIn("resolution", inspect.signature(covary.Scene.load).parameters)
         for name, parameter in inspect.signature(covary.render).parameters.items():
-            lines = re.findall(rf"^    (?:.*[ ,])?{name}[,:]", covary.render.__doc__, re.M)
+            lines = re.findall(rf"^(?:.*[ ,])?{name}[,:]", covary.render.__doc__, re.M)
             if parameter.annotation is parameter.empty:  # as declared
-                self.assertEqual(lines, [f"    {name}:"])
+                self.assertEqual(lines, [f"{name}:"])
                 self.assertIn(parameter.default, (None, False))
 
     def test_options_of_combining_are_arguments(self):
