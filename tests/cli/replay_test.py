@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The commands that repeat one sample: printed for bad samples, they give the values of the films, in every bit."""
+"""The commands that repeat one sample: printed for bad samples, they give the values of the films, in every bit. After
+training but for the last: vertices are shaded side by side, and GCC 14 fuses other products and sums where there are
+few."""
 import os
 import re
 import shlex
@@ -51,6 +53,14 @@ class ReplayTest(CliTest):
         found = re.finditer(rf"  pixel \((\d+), (\d+)\), (sample|light path) \d+: {COLOUR}\n    (.*)", result.stderr)
         return [(match[3], match.group(1, 2), match.group(4, 5, 6), match[7]) for match in found]
 
+    def assert_same(self, replayed, value, training, message):
+        """Both are colours as texts or numbers."""
+        if not training:
+            self.assertEqual(bits(replayed), bits(value), message)
+            return
+        for ours, other in zip(map(float, replayed), map(float, value), strict=True):
+            self.assertAlmostEqual(ours, other, delta=2e-7 * abs(other), msg=message)
+
     def replayed(self, words):
         return self.good(*words).stdout
 
@@ -85,7 +95,7 @@ class ReplayTest(CliTest):
             for x, y, sample in ((crop[0] + 1, crop[1] + 2, 1), (13, 9, GROUPS - 1)):
                 at = (y - crop[1]) * crop[2] + x - crop[0]
                 words[words.index("--replay") + 1] = f"{x},{y},{sample}"
-                self.assertEqual(bits(self.value(words)), bits(channels[f"group{sample:02}.{c}"][at] for c in "RGB"),
+                self.assert_same(self.value(words), [channels[f"group{sample:02}.{c}"][at] for c in "RGB"], training,
                                  (film, *words))
 
     def check_all(self, *options, **more):
