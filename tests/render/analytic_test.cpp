@@ -5,6 +5,7 @@
 // 6.3). With the standard error s of the mean of the 32 renders, the test rejects an error of 6.3 s + 2.5 s = 8.8 s
 // with power 0.99; each case asserts that this is below the relative error that it claims to detect. Every bug that a
 // case lists must be rejected.
+#include <algorithm>
 #include <cmath>
 
 #include "planted_bugs.h"
@@ -250,14 +251,28 @@ TEST(HideEmitters, LightsAreInvisibleButShine) {
   EXPECT_EQ(image_mean(render(load_text(scene_text(sky, 4, 4, -1, "")), 1, 0)), 1);
 }
 
-TEST(PlantedBugs, WithoutOneThePartsGiveTheBitsOfPath) {
-  // `path` samples spheres that it sees from outside several at a time.
+/// The largest relative difference of two images' pixels.
+double largest_difference(const Film& a, const Film& b) {
+  double largest = 0;
+  for (int y = 0; y < a.height(); ++y)
+    for (int x = 0; x < a.width(); ++x) {
+      const double value = mean(a.mean(x, y)), other = mean(b.mean(x, y));
+      largest = std::max(largest, std::abs(value - other) / std::max(other, 1e-3));
+    }
+  return largest;
+}
+
+TEST(PlantedBugs, WithoutOneThePartsGiveTheImagesOfPath) {
+  // `path` samples lights several at a time. For spheres GCC 12 rounds as it does one at a time, GCC 14 fuses other
+  // products and sums.
   const std::string around =
       "<shape type='sphere'><float name='radius' value='90'/><boolean name='flip_normals' value='true'/>"
       "<emitter type='area'><rgb name='radiance' value='0.5'/></emitter></shape>";
   for (const std::string& light : {std::string(kDimSky), around}) {
     const std::string xml = scene_text(kPlane + (kSphereLight + light), 16, 16, -1, "");
-    EXPECT_TRUE(same_bits(render(load_text(xml), 8, 0), render(load_text(xml, 0, with(Bug::kNone)), 8, 0)));
+    const Film film = render(load_text(xml), 8, 0), of_parts = render(load_text(xml, 0, with(Bug::kNone)), 8, 0);
+    EXPECT_LT(largest_difference(film, of_parts), 1e-5);
+    EXPECT_EQ(film.counts(), of_parts.counts());
   }
 }
 
