@@ -101,9 +101,9 @@ EmitterSample Sphere::sample_towards(const Vec3& reference, Vec2 u, float u_prim
 }
 
 float Sphere::pdf_solid_angle(const Vec3& reference, const SurfaceHit& hit) const {
-  const float sin2_max = radius_ * radius_ / length_squared(center_ - reference);
+  const float sin2_max = ball().squared_sine(reference);
   if (!(sin2_max < 1)) return Shape::pdf_solid_angle(reference, hit);
-  return warp::cone_pdf_solid_angle(sin2_max / (1 + safe_sqrt(1 - sin2_max)));
+  return warp::cone_pdf_solid_angle(Ball::one_minus_cos(sin2_max));
 }
 
 }  // namespace covary
