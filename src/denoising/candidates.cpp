@@ -123,7 +123,6 @@ std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, cons
   const auto n = static_cast<ptrdiff_t>(layers.size());
   std::vector<const Image*> sources;
   for (const Image& layer : layers) sources.push_back(&layer);
-  const std::vector<const Image*> given = sources;
   std::vector<NlMeansSteering> steerings;
   std::vector<Image> images;
   std::vector<std::vector<Image>> all;
@@ -137,14 +136,14 @@ std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, cons
   std::deque<Image> demodulated;
   for (const Image* source : {in.estimate, in.std_error})
     demodulated.push_back(combined(*source, guides.albedo, std::divides<>()));
-  sources.clear();
+  std::vector<const Image*> without_albedo;
   for (const Image& layer : layers)
-    sources.push_back(&demodulated.emplace_back(combined(layer, guides.albedo, std::divides<>())));
-  steerings = {{&demodulated[0], &demodulated[1], {{kSharp, sources}}}};
+    without_albedo.push_back(&demodulated.emplace_back(combined(layer, guides.albedo, std::divides<>())));
+  steerings = {{&demodulated[0], &demodulated[1], {{kSharp, without_albedo}}}};
   images = nl_means(steerings, or_null(guides.normal), *in.valid);
   for (Image& image : images) image = combined(image, guides.albedo, std::multiplies<>());
   all.push_back(std::move(images));
-  if (!guides.features.empty()) all.insert(all.begin(), regressed(guides, in, given, all.back(), false));
+  if (!guides.features.empty()) all.insert(all.begin(), regressed(guides, in, sources, all.back(), false));
   return all;
 }
 
