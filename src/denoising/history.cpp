@@ -163,13 +163,13 @@ void follow_features(History& history, const Image& albedo, const Image& normal)
       throw Error(ErrorCode::kInput, "the guides have another size than the history");
   parallel_for(history.known.size(), 1024, [&](size_t i) {
     if (!history.known[i]) return;
-    const float* const before = &history.features.data[6 * i];
-    const float* const slopes = &history.slopes.data[18 * i];
+    const float* const before = &history.features.data[kHistoryFeatures * i];
+    const float* const slopes = &history.slopes.data[3 * kHistoryFeatures * i];
     float squares = 0;
     for (size_t c = 0; c < 3; ++c) {
       float& colour = history.image.data[3 * i + c];
       float change = 0;
-      for (size_t f = 0; f < 6; ++f)
+      for (size_t f = 0; f < kHistoryFeatures; ++f)
         change += slopes[3 * f + c] * ((f < 3 ? albedo : normal).data[3 * i + f % 3] - before[f]);
       squares += sqr(change) / 3;
       const float most = kMostOfColour * (std::abs(colour) + kLeastScale);

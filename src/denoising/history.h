@@ -35,6 +35,9 @@
 
 namespace covary {
 
+/// Channels of albedo and normal together.
+inline constexpr int kHistoryFeatures = 6;
+
 /// The previous frames, reprojected to the pixels of this one.
 struct History {
   Image image;                       ///< 3 channels

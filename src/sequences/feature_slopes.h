@@ -4,12 +4,9 @@
 
 #include <array>
 
-#include "film/film.h"
+#include "denoising/history.h"
 
 namespace covary {
-
-/// Channels of albedo and normal together.
-inline constexpr int kHistoryFeatures = 6;
 
 /// Albedo and normal as one image of 6 channels; empty if either is.
 Image history_features(const Image& albedo, const Image& normal);
