@@ -22,7 +22,8 @@ Film film_of(const Spectrum& value) {
 
 std::vector<Spectrum> importance_of(const Spectrum& value) {
   const LoadedScene scene = load_sized(kRoom);
-  return pixel_importance(*scene.scene, scene.filter, film_of(value), std::nullopt, nullptr);
+  const Film film = film_of(value);
+  return pixel_importance(pixel_guides(*scene.scene, scene.filter, film, nullptr), film, std::nullopt);
 }
 
 TEST(PixelImportance, IsInverseToTheValue) {
