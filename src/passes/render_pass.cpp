@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <mutex>
 #include <tuple>
 
 #include "core/error.h"
@@ -172,23 +174,56 @@ uint64_t render_tile(const Scene& scene, const Integrator& integrator, const Pas
   return worker.n_samples - before;
 }
 
-/// Calls render(i) for each of n tiles. A learner gets the tiles' records in order, a batch of tiles at a time.
+/// Passes the records of tiles on to a learner in the order of tiles. The thread that delivers the next one in turn
+/// also absorbs those that wait for it, while they are in its cache.
+class OrderedRecords {
+ public:
+  OrderedRecords(LearningIntegrator& learner, size_t n) : learner_(learner), records_(n), delivered_(n) {}
+
+  size_t size() const { return records_.size(); }
+  /// Delivers the record of tile i, which may be null. Thread-safe.
+  void deliver(size_t i, std::unique_ptr<TrainingRecord> record) {
+    std::unique_lock lock(mutex_);
+    records_[i] = std::move(record), delivered_[i] = true;
+    if (absorbing_) return;
+    absorbing_ = true;
+    for (; next_ < records_.size() && delivered_[next_]; ++next_) {
+      std::unique_ptr<TrainingRecord> own = std::move(records_[next_]);
+      if (!own) continue;
+      lock.unlock();
+      learner_.absorb(*own);
+      own.reset();
+      lock.lock();
+    }
+    absorbing_ = false;
+  }
+
+ private:
+  LearningIntegrator& learner_;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<TrainingRecord>> records_;
+  std::vector<bool> delivered_;
+  size_t next_ = 0;         // the tile whose turn it is
+  bool absorbing_ = false;  // by some thread
+};
+
+/// Calls render(i) for each of n tiles. A learner gets the tiles' records, a batch of tiles at a time, and tiles are
+/// begun in their order.
 template <typename Render>
 void render_tiles(size_t n, LearningIntegrator* learner, const Integrator& integrator, PerThread<Worker>& workers,
                   const Render& render) {
   if (!learner) return parallel_for(n, render);
+  std::atomic<size_t> next{0};
   for (size_t first = 0; first < n; first += kLearnerTiles) {
-    std::vector<std::unique_ptr<TrainingRecord>> records(std::min(kLearnerTiles, n - first));
-    parallel_for(records.size(), [&](size_t i) {
-      render(first + i);
-      records[i] = learner->take_record(*workers.local(integrator).context.state);
+    OrderedRecords records(*learner, std::min(kLearnerTiles, n - first));
+    parallel_for(records.size(), [&](size_t) {
+      const size_t i = next.fetch_add(1, std::memory_order_relaxed);
+      render(i);
+      records.deliver(i - first, learner->take_record(*workers.local(integrator).context.state));
     });
-    for (const auto& record : records)
-      if (record) learner->absorb(*record);
   }
 }
 
-/// Checks that an integrator that learns is trained, or learns from this pass.
 void check_learner(const Integrator& integrator, const PassSettings& settings, const Film& film) {
   const LearningIntegrator* learning = integrator.learning();
   const LearningIntegrator* learner = settings.learner;

@@ -54,7 +54,7 @@ class LearningIntegrator : public Integrator {
   virtual size_t training_memory() const { return 0; }
   /// What trace() has recorded in a thread's state since the last call, or null. Not called when frozen. Thread-safe.
   virtual std::unique_ptr<TrainingRecord> take_record(ThreadState& state) const = 0;
-  /// Adds a record. Called by one thread at a time, in the order of tiles, never null.
+  /// Adds a record. Called by one thread at a time, in the order of tiles, never null; other threads may be tracing.
   virtual void absorb(const TrainingRecord& record) = 0;
 
   /// Whether the training can be saved and loaded, by the two functions below.
