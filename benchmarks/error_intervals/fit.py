@@ -8,8 +8,9 @@ the coefficients that fit them best to src/risk/error_interval_table.h. Needs nu
 
 The middle is a ridge regression of log(relMSE / V), the spread one of the log of its residuals. A mixture that is the
 mean of the samples, V = v, has V as its error, and one that is the mean in part is shrunk towards that. Each render is
-weighted by how well its references know its error. Quantiles are those of families of scenes that were left out, so
-that the interval covers how much scenes differ from those that were fitted."""
+weighted by how well its references know its error, for the spread and its quantiles even more, because what references
+do not know looks like spread. Quantiles are those of families of scenes that were left out, so that the interval covers
+how much scenes differ from those that were fitted."""
 import argparse
 import csv
 import math
@@ -20,9 +21,13 @@ from measure import FEWEST_GROUPS, HERE, KINDS, measure_all, render_all
 from variants import SCENES, family_of
 
 TABLE, DATA = HERE.parent.parent / "src/risk/error_interval_table.h", HERE / "renders.csv"
-#: Sigma of the prior of each coefficient but the constant, for kinds of which most is known from other scenes
-#: (docs/notes) and for others; what is added to the reference's noise
-RIDGE, USUAL_RIDGE, NOISE_FLOOR = {"filters": 0.04, "network": 0.04}, 0.1, 0.1
+#: Sigma of the prior of each coefficient but the constant: of the middle, for kinds of which most is known from other
+#: scenes, and for one that left-out families predict best (docs/notes); of others; what is added to the reference's
+#: noise
+RIDGE, USUAL_RIDGE, NOISE_FLOOR = {"filters": 0.04, "network": 0.04, "few-filters": 0.2}, 0.1, 0.1
+#: Noise of the reference, over the truth, from which on a render says little about spread and quantiles: of kinds of
+#: which enough renders are known so well
+KNOWN = {"filters": 0.1, "network": 0.1}
 #: difference of logarithms from which on a render counts little
 OUTLIER = 0.5
 TRUSTED, LEAST, MOST, MISSING_COVARIANCE = 0.5, 0.5, 30, 0.27
@@ -31,8 +36,8 @@ MOST_OF_LARGEST, MOST_FACTOR, MOST_SPECULAR, FEWEST_PIXELS = 0.55, 5, 0.5, 20
 LEAST_FACTOR = 1.15
 #: How far off bounds are, in the logarithm, of what holds 80 of 100 renders of families that were left out: rooms that
 #: nobody chose differ more than scenes that somebody made. Chosen with one seed of ten of these in view (docs/notes);
-#: of other kinds, whose intervals hold often enough, 1
-WIDTH = {"mean": 0.7, "filters": 0.7, "network": 0.7}
+#: of other kinds, whose intervals hold often enough or are too narrow with few samples, 1
+WIDTH = {"mean": 0.7, "network": 0.7}
 
 
 def features(row):
@@ -84,6 +89,7 @@ class Fit:
         variance = numpy.array([float(r["variance"]) / float(r["values"]) for r in self.rows])
         truth = numpy.array([float(r["relmse"]) for r in self.rows])
         self.noise = numpy.array([float(r["reference_noise"]) for r in self.rows]) / truth
+        self.known = 1 / (1 + (self.noise / KNOWN.get(kind, math.inf))**2)**2
         self.y = numpy.log(truth / variance)
         self.scenes = numpy.array([r["scene"] for r in self.rows])
         families = numpy.array([family_of(scene) for scene in self.scenes])
@@ -102,8 +108,9 @@ class Fit:
         self.r = r
         least = math.log(LEAST_FACTOR) / numpy.exp(numpy.median(self.x @ self.spread))
         width = WIDTH.get(kind, 1)
-        self.quantiles = (width * min(weighted_quantile(r, 1 / self.size, 0.1), -least),
-                          width * max(weighted_quantile(r, 1 / self.size, 0.9), least))
+        weight = self.known / self.size
+        self.quantiles = (width * min(weighted_quantile(r, weight, 0.1), -least),
+                          width * max(weighted_quantile(r, weight, 0.9), least))
 
     @staticmethod
     def log_spread_limits(values):
@@ -117,9 +124,9 @@ class Fit:
         for _ in range(20):  # renders that nothing explains, which light that was not found makes, count little
             middle = weighted_ridge(of_middle, y, weight / (1 + ((y - of_middle @ middle) / OUTLIER)**2)**2, sigma)
         left = numpy.log(numpy.clip(abs(y - of_middle @ middle), 0.03, 1)) + 0.635  # E log |normal number| = -0.635
-        wanted = numpy.array([1, 0, 1, 0, 0, 1, 1, 1, 0])  # what speaks for noise and for rare light
+        wanted = numpy.array([1, 0, 1, 0, 0, self.kind not in KNOWN, 1, 1, 0])  # noise and rare light
         spread = numpy.zeros(x.shape[1])
-        spread[wanted > 0] = weighted_ridge(x[:, wanted > 0], left, weight / 4, sigma)
+        spread[wanted > 0] = weighted_ridge(x[:, wanted > 0], left, weight / 4 * self.known[use], USUAL_RIDGE)
         return middle, spread
 
     def text(self):
@@ -162,7 +169,7 @@ struct FittedErrors {{
 inline constexpr FittedErrors kFittedErrors[] = {{
 {rows}
 }};
-/// Of denoised means of fewer groups than kFewestGroups: by filters, by a network.
+/// For denoised means of fewer than kFewestGroups groups: by filters, by a network.
 inline constexpr FittedErrors kFittedToFew[] = {{
 {few}
 }};
