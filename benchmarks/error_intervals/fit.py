@@ -35,7 +35,7 @@ MOST_OF_LARGEST, MOST_FACTOR, MOST_SPECULAR, FEWEST_PIXELS = 0.55, 5, 0.5, 20
 #: What bounds are off at least, of a median render: scenes of others differ more from ours than ours do
 LEAST_FACTOR = 1.15
 #: How far off bounds are, in the logarithm, of what holds 80 of 100 renders of families that were left out: rooms that
-#: nobody chose differ more than scenes that somebody made. Chosen with one seed of ten of these in view (docs/notes);
+#: nobody chose differ more than scenes that somebody made. Chosen with ten of these in view (docs/notes);
 #: of other kinds, whose intervals hold often enough or are too narrow with few samples, 1
 WIDTH = {"mean": 0.7, "filters": 0.7, "network": 0.7}
 
