@@ -7,6 +7,8 @@
 namespace covary {
 namespace {
 
+constexpr int kLanes = 16;  // of loops that are vectorised
+
 /// Integral over t in [0, 1] of the tent (1 - t) times sin(theta + direction t d): half the tent of the row at angle
 /// `theta`, with row spacing d; `direction` is +1 or -1.
 double tent_times_sine(double theta, double d, double direction) {
@@ -20,15 +22,56 @@ struct CellChoice {
   float remapped;  // uniform in [0, 1) again
 };
 
-/// Chooses one of four cells in proportion to their weights, at least one of which is positive.
-CellChoice choose_cell(const float (&weights)[4], float u) {
-  // Cell boundaries; comparisons instead of branches, half of which would be mispredicted.
-  const float b1 = weights[0], b2 = b1 + weights[1], b3 = b2 + weights[2], sum = b3 + weights[3];
-  const float x = u * sum;
-  int index = (x >= b1) + (x >= b2) + (x >= b3);
-  while (!(weights[index] > 0)) index = (index + 3) % 4;  // rounding can select an empty last cell
-  const float lower = index == 0 ? 0 : (index == 1 ? b1 : (index == 2 ? b2 : b3));
-  return {index, std::clamp((x - lower) / weights[index], 0.0f, kOneMinusEpsilon)};
+/// Chooses one of four cells in proportion to their weights, at least one of which is positive. Values are selected
+/// instead of branching, which half of the time would be mispredicted, and does not vectorise.
+inline CellChoice choose_cell(float w0, float w1, float w2, float w3, float u) {
+  const float b1 = w0, b2 = b1 + w1, b3 = b2 + w2, x = u * (b3 + w3);
+  int last = w1 > 0 ? 1 : 0;  // rounding can select an empty last cell
+  last = w2 > 0 ? 2 : last;
+  last = w3 > 0 ? 3 : last;
+  int index = x >= b1 ? 1 : 0;
+  index = x >= b2 ? 2 : index;
+  index = x >= b3 ? 3 : index;
+  index = std::min(index, last);
+  float lower = 0, weight = w0;
+  lower = index == 1 ? b1 : lower, weight = index == 1 ? w1 : weight;
+  lower = index == 2 ? b2 : lower, weight = index == 2 ? w2 : weight;
+  lower = index == 3 ? b3 : lower, weight = index == 3 ? w3 : weight;
+  const float remapped = (x - lower) / weight;
+  return {index, std::max(0.0f, std::min(remapped, kOneMinusEpsilon))};
+}
+
+/// choose_cell() for `n` samples, rounded up to whole vectors; `u` is remapped.
+void choose_cells(int n, const float (&weights)[4][EnvironmentSamples::kCapacity], float* u, int* index) {
+  for (int first = 0; first < n; first += kLanes) {
+#pragma GCC ivdep
+    for (int l = first; l < first + kLanes; ++l) {
+      const CellChoice choice = choose_cell(weights[0][l], weights[1][l], weights[2][l], weights[3][l], u[l]);
+      index[l] = choice.index, u[l] = choice.remapped;
+    }
+  }
+}
+
+/// Where `u` and `v` in [0, 1) lie in the tent of a texel, or at a pole in the half of it that is inside the image.
+inline Vec2 point_in(int column, int row, float u, float v, int width, int height) {
+  const float half_tent = 1 - safe_sqrt(1 - v);
+  float offset = warp::interval_to_tent(v, 1);
+  offset = row == 0 ? half_tent : offset;
+  offset = row == height - 1 ? -half_tent : offset;
+  const float y = clamp01((static_cast<float>(row) + offset) / static_cast<float>(height - 1));
+  const float x = (static_cast<float>(column) + 0.5f + warp::interval_to_tent(u, 1)) / static_cast<float>(width);
+  float around = x < 0 ? x + 1 : x;
+  around = x >= 1 ? x - 1 : around;
+  return {clamp01(around), y};
+}
+
+struct Direction {
+  Vec3 d;
+  float sine;  // of the angle to the y axis
+};
+inline Direction direction_of(Vec2 at) {
+  const SinCos theta = sincos_turns(0.5f * at.y), phi = sincos_turns(at.x);
+  return {{phi.sin * theta.sin, theta.cos, -phi.cos * theta.sin}, theta.sin};
 }
 
 }  // namespace
@@ -103,37 +146,44 @@ void EnvironmentImage::make_tables(bool mis_compensation) {
   inverse_z_ = static_cast<float>(static_cast<double>(width_) * (height_ - 1) / z);
 }
 
-EnvironmentImage::UvLookup EnvironmentImage::lookup_uv(float u, float v) const {
-  const float x = u * static_cast<float>(width_) - 0.5f, y = v * static_cast<float>(height_ - 1);
+inline EnvironmentImage::Cell EnvironmentImage::cell_at(float u, float v, int width, int height) {
+  const float x = u * static_cast<float>(width) - 0.5f, y = v * static_cast<float>(height - 1);
   int column = static_cast<int>(std::floor(x));
-  const int row = std::clamp(static_cast<int>(y), 0, height_ - 2);
+  const int row = std::clamp(static_cast<int>(y), 0, height - 2);
   const float fx = x - static_cast<float>(column), fy = y - static_cast<float>(row);
-  if (column < 0) column += width_;
-  column = std::clamp(column, 0, width_ - 1);
-  const int next = column + 1 < width_ ? column + 1 : 0;
-  const Texel *upper = texels_.data() + layout_.row_offset(row), *lower = texels_.data() + layout_.row_offset(row + 1);
+  column = column < 0 ? column + width : column;
+  column = std::clamp(column, 0, width - 1);
+  return {column, column + 1 < width ? column + 1 : 0, row, fx, fy};
+}
+
+inline EnvironmentImage::Corners EnvironmentImage::corners_of(int column, int next, int row) const {
+  const Texel* upper = texels_.data() + layout_.row_offset(row);
+  const Texel* lower = texels_.data() + layout_.row_offset(row + 1);
   const size_t left = BlockLayout::column_offset(column), right = BlockLayout::column_offset(next);
-  const Texel &t00 = upper[left], &t10 = upper[right], &t01 = lower[left], &t11 = lower[right];
+  return {upper + left, upper + right, lower + left, lower + right};
+}
+
+inline EnvironmentImage::UvLookup EnvironmentImage::interpolate(const Corners& corners, float fx, float fy) const {
   const float w00 = (1 - fx) * (1 - fy), w10 = fx * (1 - fy), w01 = (1 - fx) * fy, w11 = fx * fy;
-  return {t00.value * w00 + t10.value * w10 + t01.value * w01 + t11.value * w11,
-          (t00.weight * w00 + t10.weight * w10 + t01.weight * w01 + t11.weight * w11) * inverse_z_};
+  const auto& [t00, t10, t01, t11] = corners;
+  return {t00->value * w00 + t10->value * w10 + t01->value * w01 + t11->value * w11,
+          (t00->weight * w00 + t10->weight * w10 + t01->weight * w01 + t11->weight * w11) * inverse_z_};
 }
 
 EnvironmentImage::Lookup EnvironmentImage::lookup(const Vec3& d) const {
   const float sine = std::sqrt(d.x * d.x + d.z * d.z);
-  const UvLookup found = lookup_uv(angle_turns(d.x, -d.z), 2 * angle_turns(sine, d.y));
+  const UvLookup found = interpolate(cell_at(angle_turns(d.x, -d.z), 2 * angle_turns(sine, d.y), width_, height_));
   // d(omega) = sin(theta) d(theta) d(phi) = 2 pi^2 sin(theta) du dv.
   return {found.value, sine > 0 ? found.pdf_uv / (2 * kPi * kPi * sine) : 0};
 }
 
-void EnvironmentImage::prefetch_table(Vec2 u) const {
-  if (!black_) block_columns_[block_rows_.sample(u.y).index].prefetch(u.x);
-}
-
-void EnvironmentImage::prefetch_texels(Vec2 u) const {
-  if (black_) return;
-  const Texel* texels = block(choose_block(u));
-  for (int i = 0; i < kBlock; ++i) __builtin_prefetch(texels + i * kBlock);
+inline std::array<float, EnvironmentImage::kBlock> EnvironmentImage::row_weights(const Texel* block, int y0) const {
+  std::array<float, kBlock> weights;
+  for (int i = 0; i < kBlock; ++i) {
+    const Texel* row = block + i * kBlock;
+    weights[i] = ((row[0].weight + row[1].weight) + (row[2].weight + row[3].weight)) * tent_mass(y0 + i);
+  }
+  return weights;
 }
 
 EnvironmentImage::Sample EnvironmentImage::sample(Vec2 u) const {
@@ -143,31 +193,76 @@ EnvironmentImage::Sample EnvironmentImage::sample(Vec2 u) const {
   // A texel of the block: row from the remapped u.y, column from the remapped u.x.
   const Texel* texels = block(chosen);
   const int x0 = static_cast<int>(chosen.x) * kBlock, y0 = static_cast<int>(chosen.y) * kBlock;
-  float row_weights[kBlock], columns[kBlock];
-  for (int i = 0; i < kBlock; ++i) {
-    const Texel* row = texels + i * kBlock;
-    row_weights[i] = ((row[0].weight + row[1].weight) + (row[2].weight + row[3].weight)) * tent_mass(y0 + i);
+  const std::array<float, kBlock> rows = row_weights(texels, y0);
+  const CellChoice row = choose_cell(rows[0], rows[1], rows[2], rows[3], chosen.remapped.y);
+  texels += row.index * kBlock;
+  const CellChoice column =
+      choose_cell(texels[0].weight, texels[1].weight, texels[2].weight, texels[3].weight, chosen.remapped.x);
+
+  const Vec2 at = point_in(x0 + column.index, y0 + row.index, column.remapped, row.remapped, width_, height_);
+  const Direction towards = direction_of(at);
+  const UvLookup found = interpolate(cell_at(at.x, at.y, width_, height_));
+  return {towards.d, found.value, towards.sine > 1e-8f ? found.pdf_uv / (2 * kPi * kPi * towards.sine) : 0};
+}
+
+void EnvironmentImage::sample(EnvironmentSamples& samples) const {
+  constexpr int kMost = EnvironmentSamples::kCapacity;
+  const int n = samples.size;
+  if (black_) {
+    for (int l = 0; l < n; ++l) samples.pdf_solid_angle[l] = 0;
+    return;
   }
-  const CellChoice row = choose_cell(row_weights, chosen.remapped.y);
-  for (int i = 0; i < kBlock; ++i) columns[i] = texels[row.index * kBlock + i].weight;
-  const CellChoice column = choose_cell(columns, chosen.remapped.x);
-
-  // A position in the texel's tent, or at a pole in the half of it that lies inside the image.
-  const int y = y0 + row.index;
-  const float half_tent = 1 - safe_sqrt(1 - row.remapped);
-  const float offset = y == 0 ? half_tent : (y == height_ - 1 ? -half_tent : warp::interval_to_tent(row.remapped, 1));
-  const float v = clamp01((static_cast<float>(y) + offset) / static_cast<float>(height_ - 1));
-  float s = (static_cast<float>(x0 + column.index) + 0.5f + warp::interval_to_tent(column.remapped, 1)) /
-            static_cast<float>(width_);
-  s = clamp01(s < 0 ? s + 1 : (s >= 1 ? s - 1 : s));
-
-  const SinCos theta = sincos_turns(0.5f * v), phi = sincos_turns(s);
-  const UvLookup found = lookup_uv(s, v);
-  Sample sample;
-  sample.d = {phi.sin * theta.sin, theta.cos, -phi.cos * theta.sin};
-  sample.value = found.value;
-  sample.pdf_solid_angle = theta.sin > 1e-8f ? found.pdf_uv / (2 * kPi * kPi * theta.sin) : 0;
-  return sample;
+  // Memory accesses of a step overlap: entries of the tables, then texels.
+  Discrete::Result block_rows[kMost];
+  for (int l = 0; l < n; ++l) {
+    block_rows[l] = block_rows_.sample(samples.u_y[l]);
+    block_columns_[block_rows[l].index].prefetch(samples.u_x[l]);
+  }
+  alignas(64) float weights[kBlock][kMost] = {}, rest_x[kMost] = {}, rest_y[kMost] = {};
+  alignas(64) int column[kMost] = {}, row[kMost] = {};
+  const Texel* texels[kMost];
+  for (int l = 0; l < n; ++l) {
+    const AliasTable::Result found = block_columns_[block_rows[l].index].sample(samples.u_x[l]);
+    column[l] = static_cast<int>(found.index) * kBlock, row[l] = static_cast<int>(block_rows[l].index) * kBlock;
+    rest_x[l] = found.remapped, rest_y[l] = block_rows[l].remapped;
+    texels[l] = texels_.data() + layout_.index(column[l], row[l]);
+    for (int i = 0; i < kBlock; ++i) __builtin_prefetch(texels[l] + i * kBlock);
+  }
+  for (int l = 0; l < n; ++l) {
+    const std::array<float, kBlock> rows = row_weights(texels[l], row[l]);
+    for (int i = 0; i < kBlock; ++i) weights[i][l] = rows[i];
+  }
+  alignas(64) int row_in_block[kMost] = {}, column_in_block[kMost] = {};
+  choose_cells(n, weights, rest_y, row_in_block);
+  for (int l = 0; l < n; ++l) {
+    for (int i = 0; i < kBlock; ++i) weights[i][l] = texels[l][row_in_block[l] * kBlock + i].weight;
+    row[l] += row_in_block[l];
+  }
+  choose_cells(n, weights, rest_x, column_in_block);
+  alignas(64) float sine[kMost], right[kMost], below[kMost];
+  alignas(64) int next[kMost];
+  const int width = width_, height = height_;
+  for (int first = 0; first < n; first += kLanes) {
+#pragma GCC ivdep
+    for (int l = first; l < first + kLanes; ++l) {
+      const Vec2 at = point_in(column[l] + column_in_block[l], row[l], rest_x[l], rest_y[l], width, height);
+      const Direction towards = direction_of(at);
+      samples.wi_x[l] = towards.d.x, samples.wi_y[l] = towards.d.y, samples.wi_z[l] = towards.d.z;
+      sine[l] = towards.sine;
+      const Cell cell = cell_at(at.x, at.y, width, height);
+      column[l] = cell.column, next[l] = cell.next, row[l] = cell.row, right[l] = cell.right, below[l] = cell.below;
+    }
+  }
+  Corners corners[kMost];
+  for (int l = 0; l < n; ++l) {
+    corners[l] = corners_of(column[l], next[l], row[l]);
+    for (const Texel* corner : corners[l]) __builtin_prefetch(corner);
+  }
+  for (int l = 0; l < n; ++l) {
+    const UvLookup found = interpolate(corners[l], right[l], below[l]);
+    samples.r[l] = found.value.r, samples.g[l] = found.value.g, samples.b[l] = found.value.b;
+    samples.pdf_solid_angle[l] = sine[l] > 1e-8f ? found.pdf_uv / (2 * kPi * kPi * sine[l]) : 0;
+  }
 }
 
 }  // namespace covary

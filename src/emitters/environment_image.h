@@ -17,12 +17,14 @@
 // sample then touches one or two places in the large array.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "core/distribution.h"
 #include "core/large_vector.h"
 #include "core/spectrum.h"
 #include "core/vec.h"
+#include "scene/emitter.h"
 #include "textures/block_layout.h"
 #include "textures/image.h"
 
@@ -50,11 +52,8 @@ class EnvironmentImage {
     float pdf_solid_angle;  ///< 0 if the image is black
   };
   Sample sample(Vec2 u) const;
-  /// Prefetch what sample(u) reads, which may lie anywhere in arrays larger than the caches: the entry in the table of
-  /// blocks, and, once that has arrived, the texels of the block.
-  void prefetch_table(Vec2 u) const;
-  void prefetch_texels(Vec2 u) const;
-
+  /// sample() of each `u`, up to rounding; `wi` is `d`.
+  void sample(EnvironmentSamples& samples) const;
   /// Integral of the value over the sphere of directions.
   const Spectrum& integral() const { return integral_; }
 
@@ -82,7 +81,20 @@ class EnvironmentImage {
     Spectrum value;
     float pdf_uv;
   };
-  UvLookup lookup_uv(float u, float v) const;
+  /// The four texels around a point, and the weights of those to the right and below.
+  struct Cell {
+    int column, next, row;
+    float right, below;
+  };
+  static Cell cell_at(float u, float v, int width, int height);
+  using Corners = std::array<const Texel*, 4>;
+  Corners corners_of(int column, int next, int row) const;
+  UvLookup interpolate(const Corners& corners, float right, float below) const;
+  UvLookup interpolate(const Cell& cell) const {
+    return interpolate(corners_of(cell.column, cell.next, cell.row), cell.right, cell.below);
+  }
+  /// Weights of the rows of a block that begins at row `y0`.
+  std::array<float, kBlock> row_weights(const Texel* block, int y0) const;
   /// Fraction of a row's tent that lies inside the image.
   float tent_mass(int row) const { return row == 0 || row == height_ - 1 ? 0.5f : 1.0f; }
 

@@ -40,6 +40,33 @@ class EnvironmentSampling : public testing::TestWithParam<Case> {
   }
 };
 
+// Only last bits may differ, where compilers fuse other operations in a vectorised loop.
+TEST_P(EnvironmentSampling, SamplesTakenTogetherAreTheSame) {
+  const EnvironmentImage environment = this->environment();
+  for (int first = 0; first < 4096; first += 50) {
+    EnvironmentSamples samples;
+    samples.size = 50;  // not whole vectors
+    Vec2 u[50];
+    for (int i = 0; i < samples.size; ++i) {
+      u[i] = PathRandom(Sampling::kIndependent, 7, 0, 0, static_cast<uint64_t>(first + i))
+                 .get_2d(0, Event::kLightPosition);
+      samples.u_x[i] = u[i].x, samples.u_y[i] = u[i].y;
+    }
+    environment.sample(samples);
+    for (int i = 0; i < samples.size; ++i) {
+      const EnvironmentImage::Sample expected = environment.sample(u[i]);
+      const auto expect_same = [](float value, float other) {
+        EXPECT_NEAR(value, other, 1e-4f * std::abs(other) + 1e-6f);
+      };
+      expect_same(samples.wi_x[i], expected.d.x), expect_same(samples.wi_y[i], expected.d.y);
+      expect_same(samples.wi_z[i], expected.d.z);
+      expect_same(samples.pdf_solid_angle[i], expected.pdf_solid_angle);
+      expect_same(samples.r[i], expected.value.r), expect_same(samples.g[i], expected.value.g);
+      expect_same(samples.b[i], expected.value.b);
+    }
+  }
+}
+
 // N = 400 000, alpha = 5e-7: detects an rms error of 2.3 % of the density with power 0.99 (statistics/chi2.h).
 TEST_P(EnvironmentSampling, DirectionsFollowTheirDensity) {
   const EnvironmentImage environment = this->environment();

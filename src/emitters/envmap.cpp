@@ -43,13 +43,6 @@ class EnvironmentMap final : public Emitter {
     const typename Image::Lookup found = image_->lookup(rotation_.to_local(d));
     return {found.value, found.pdf_solid_angle};
   }
-  void prefetch(Vec2 u, PrefetchStep step) const override {
-    if (step == PrefetchStep::kTable)
-      image_->prefetch_table(u);
-    else
-      image_->prefetch_texels(u);
-  }
-
   EmitterSample sample_towards(const Vec3&, Vec2 u, float) const override {
     const typename Image::Sample from = image_->sample(u);
     EmitterSample sample;
@@ -57,6 +50,18 @@ class EnvironmentMap final : public Emitter {
     sample.radiance = from.value;
     sample.pdf_solid_angle = from.pdf_solid_angle;
     return sample;
+  }
+
+  bool sample_environment(EnvironmentSamples& samples) const override {
+    if constexpr (std::is_same_v<Image, EnvironmentImage>) {
+      image_->sample(samples);
+      for (int l = 0; l < samples.size; ++l) {
+        const Vec3 wi = rotation_.to_world({samples.wi_x[l], samples.wi_y[l], samples.wi_z[l]});
+        samples.wi_x[l] = wi.x, samples.wi_y[l] = wi.y, samples.wi_z[l] = wi.z;
+      }
+      return true;
+    }
+    return false;
   }
 
   EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float) const override {

@@ -28,8 +28,6 @@ class EqualAreaImage {
 
   using Sample = EnvironmentImage::Sample;
   Sample sample(Vec2 u) const;
-  void prefetch_table(Vec2) const {}
-  void prefetch_texels(Vec2) const {}
 
   /// Integral of the value over the sphere of directions.
   const Spectrum& integral() const { return integral_; }

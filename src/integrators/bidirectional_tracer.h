@@ -146,8 +146,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
           tracer.mis_.arrive(sums, mis_cosine(at.hit.ng, batch.rays[i].d), length_squared(at.hit.p - path.previous_p));
       const CameraVertex end{at.hit, at.wo, at.bsdf, path, sums, depth + 2};
       if (use_light_samples && batch.lights[i].pdf_solid_angle > 0)
-        tracer.join_to_light(lights.pmf(*batch.choices[i].emitter), *batch.choices[i].emitter, batch.lights[i], end,
-                             state);
+        tracer.join_to_light(lights.pmf(*batch.choices[i]), *batch.choices[i], batch.lights[i], end, state);
       if (at.hit.bsdf_flags & kSmooth)
         for (const LightVertex& light : state.light.path(state.light_path[path.sample])) tracer.join(light, end, state);
       return tracer.go_on(depth, at, path, sums, batch.rays[i]);

@@ -79,7 +79,7 @@ class DirectIntegrator final : public Integrator {
       const Vec3 wo = hit.frame.to_local(-batch.rays[i].d);
       const BsdfValue f = bind(hit, wo, context).eval(wo, hit.frame.to_local(light.wi));
       if (is_black(f.value)) continue;
-      const float pdf = lights.pmf(*batch.choices[i].emitter) * light.pdf_solid_angle;
+      const float pdf = lights.pmf(*batch.choices[i]) * light.pdf_solid_angle;
       const float weight = light.is_delta ? 1 : mis::power(pdf * light_share_, f.pdf_solid_angle * direction_share_);
       const size_t n = batch.n_connections++;
       batch.connections[n] = {f.value * light.radiance * (weight * each / pdf), batch.paths[i].sample};

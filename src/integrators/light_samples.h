@@ -2,12 +2,14 @@
 // Shared by tracers that sample one light of a LightSet at each vertex, and the environment separately.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "core/in_place.h"
 #include "integrators/primary_sample.h"
 #include "passes/integrator.h"
+#include "sampling/environment_queue.h"
 #include "sampling/light_set.h"
 
 namespace covary {
@@ -40,28 +42,26 @@ void choose_lights(const LightSet& lights, const Emitter* environment, std::span
       choice.u = random.get_2d(vertex, Event::kLightPosition);
       choice.u_primitive = random.get_1d(vertex, Event::kLightPrimitive);
     }
-    if (!environment) continue;
-    choice.u_environment = random.get_2d(kEnvironmentVertices + vertex, Event::kLightPosition);
-    environment->prefetch(choice.u_environment, PrefetchStep::kTable);
+    if (environment) choice.u_environment = random.get_2d(kEnvironmentVertices + vertex, Event::kLightPosition);
   }
-  if (!environment) return;
-  for (size_t i = 0; i < batch.paths.size(); ++i)
-    if (batch.choices[i].open) environment->prefetch(batch.choices[i].u_environment, PrefetchStep::kValues);
 }
 
 /// The light and environment samples of all vertices; densities are 0 where there are none.
 template <typename Batch>
 void sample_lights(const LightSet& lights, const Emitter* environment, Batch& batch) {
-  for (size_t i = 0; i < batch.paths.size(); ++i) {
+  const auto set = [&batch](uint32_t i, const EmitterSample& sample) { batch.environments[i] = sample; };
+  std::optional<EnvironmentQueue> queue;
+  if (environment) queue.emplace(*environment);
+  for (uint32_t i = 0; i < batch.paths.size(); ++i) {
     const LightSetChoice& choice = batch.choices[i];
     batch.lights[i].pdf_solid_angle = batch.environments[i].pdf_solid_angle = 0;
     if (!choice.open) continue;
     const Vec3& p = batch.hits[i].p;
     if (!lights.empty())
       make_in_place(batch.lights[i], [&] { return lights.sample(choice.light, p, choice.u, choice.u_primitive); });
-    if (environment)
-      make_in_place(batch.environments[i], [&] { return environment->sample_towards(p, choice.u_environment, 0); });
+    if (queue) queue->add(i, choice.u_environment, set);
   }
+  if (queue) queue->finish(set);
 }
 
 }  // namespace covary

@@ -24,7 +24,7 @@ struct PathState {
 };
 
 /// Camera paths that an integrator advances together, and the per-path arrays passed between its loops. `PathType`:
-/// state of a path, a PathState or more; `ChoiceType`: the light that a vertex samples, and the random numbers for it;
+/// state of a path, a PathState or more; `ChoiceType`: the light that a vertex samples, with what else is needed;
 /// `ConnectionType`: a light sample that counts if unoccluded.
 template <typename PathType, typename ChoiceType, typename ConnectionType>
 struct CameraBatch : ThreadState {
@@ -59,13 +59,6 @@ struct CameraBatch : ThreadState {
   std::vector<uint32_t> alive;   ///< indices of the paths that continue
 };
 
-/// A selected light.
-struct EmitterChoice {
-  const Emitter* emitter = nullptr;  ///< null: the surface cannot use light samples
-  Vec2 u;
-  float u_primitive = 0;
-};
-
 /// Contribution of a light sample to a sample of the batch.
 struct LightConnection {
   Spectrum radiance;
@@ -73,7 +66,7 @@ struct LightConnection {
 };
 
 /// The batch of PathTracer.
-struct PathBatch final : CameraBatch<PathState, EmitterChoice, LightConnection> {
+struct PathBatch final : CameraBatch<PathState, const Emitter*, LightConnection> {
   LambertianMeshes meshes;
   LambertianBlock block;
   std::vector<const Emitter*> connected;  ///< the lights of the connections, if lights are separated

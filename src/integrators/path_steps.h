@@ -4,12 +4,14 @@
 #pragma once
 
 #include <cmath>
+#include <optional>
 #include <span>
 
 #include "core/in_place.h"
 #include "integrators/path_batch.h"
 #include "integrators/path_lengths.h"
 #include "integrators/primary_sample.h"
+#include "sampling/environment_queue.h"
 #include "sampling/roulette.h"
 
 namespace covary {
@@ -206,33 +208,29 @@ void follow_paths(const Scene& scene, const PathLengthSettings& lengths, std::sp
   }
 }
 
-/// One light sample for each vertex whose surface can use it. All lights are chosen and prefetched before the first
-/// sample is taken, so that memory accesses overlap.
+/// One light sample for each vertex whose surface can use it.
 template <typename Lights>
 void sample_lights(const Scene& scene, const Lights& lights, std::span<const CameraSample> samples, PathBatch& batch) {
-  for (size_t i = 0; i < batch.paths.size(); ++i) {
-    batch.choices[i].emitter = nullptr;
+  const auto set = [&batch](uint32_t i, const EmitterSample& sample) { batch.lights[i] = sample; };
+  std::optional<EnvironmentQueue> environment;
+  if (scene.environment()) environment.emplace(*scene.environment());
+  for (uint32_t i = 0; i < batch.paths.size(); ++i) {
+    batch.choices[i] = nullptr;
+    batch.lights[i].pdf_solid_angle = 0;
     if (!(batch.hits[i].bsdf_flags & kSmooth)) continue;
     const PathRandom& random = samples[batch.paths[i].sample].random;
     const uint32_t vertex = kFirstSurfaceVertex + batch.paths[i].n_smooth;
     const Emitter& emitter = lights.select(random.get_1d(vertex, Event::kLightChoice));
     const Vec2 u = random.get_2d(vertex, Event::kLightPosition);
-    if (scene.environment()) emitter.prefetch(u, PrefetchStep::kTable);
-    batch.choices[i].emitter = &emitter;
-    batch.choices[i].u = u;
-    batch.choices[i].u_primitive = random.get_1d(vertex, Event::kLightPrimitive);
-  }
-  if (scene.environment())  // the only lights with large tables
-    for (size_t i = 0; i < batch.paths.size(); ++i)
-      if (batch.choices[i].emitter) batch.choices[i].emitter->prefetch(batch.choices[i].u, PrefetchStep::kValues);
-  for (size_t i = 0; i < batch.paths.size(); ++i) {
-    const PathBatch::LightChoice& choice = batch.choices[i];
-    if (!choice.emitter)
-      batch.lights[i].pdf_solid_angle = 0;
+    batch.choices[i] = &emitter;
+    if (&emitter == scene.environment())
+      environment->add(i, u, set);
     else
-      make_in_place(batch.lights[i],
-                    [&] { return choice.emitter->sample_towards(batch.hits[i].p, choice.u, choice.u_primitive); });
+      make_in_place(batch.lights[i], [&] {
+        return emitter.sample_towards(batch.hits[i].p, u, random.get_1d(vertex, Event::kLightPrimitive));
+      });
   }
+  if (environment) environment->finish(set);
 }
 
 }  // namespace covary

@@ -117,7 +117,7 @@ class PathTracer final : public Integrator {
     bool scatter(int depth, uint32_t i, const PathVertex& vertex) {
       Path& path = batch.paths[i];
       if (connecting && batch.lights[i].pdf_solid_angle > 0)
-        connect_light(*batch.choices[i].emitter, path, vertex, batch.lights[i]);
+        connect_light(*batch.choices[i], path, vertex, batch.lights[i]);
 
       const BsdfSample next =
           tracer.parts_.sample_direction(vertex.bsdf, vertex.hit, vertex.wo, vertex.sample.random, vertex.address);
@@ -174,9 +174,6 @@ class PathTracer final : public Integrator {
     void connect_block(LambertianBlock& block) {
       const Emitter* emitters[LambertianBlock::kCapacity];
       for (int l = 0; l < block.size(); ++l) emitters[l] = &lights.select(block.u_choice[l]);
-      if (scene.environment())  // the only lights with large tables
-        for (const PrefetchStep step : {PrefetchStep::kTable, PrefetchStep::kValues})
-          for (int l = 0; l < block.size(); ++l) emitters[l]->prefetch({block.u_light_x[l], block.u_light_y[l]}, step);
       block.sample_lights(emitters);
       block.connect(lights.pmf(*emitters[0]));
       for (int l = 0; l < block.size(); ++l) {

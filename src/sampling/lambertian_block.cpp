@@ -5,6 +5,7 @@
 
 #include "core/frame.h"
 #include "core/warp.h"
+#include "sampling/environment_queue.h"
 #include "sampling/mis.h"
 #include "sampling/roulette.h"
 
@@ -109,17 +110,27 @@ void LambertianBlock::find_surfaces(const Scene& scene) {
 
 void LambertianBlock::sample_lights(const Emitter* const* lights) {
   bool parallelograms = false, spheres = false;
+  const Emitter* environment = nullptr;
   for (int l = 0; l < size_; ++l) {
     is_open_[l] = true, is_sphere_[l] = false;
     if (const ParallelogramLight* parallelogram = lights[l]->parallelogram())
       set_parallelogram(l, *parallelogram), is_open_[l] = false, parallelograms = true;
     else if (const SphereLight* sphere = lights[l]->sphere())
       set_sphere(l, *sphere), spheres = true;
+    else if (lights[l]->is_environment())
+      environment = lights[l];
   }
   if (parallelograms) sample_parallelograms();
   if (spheres) sample_spheres();
   for (int l = 0; l < size_; ++l)
-    if (is_open_[l]) set_light(l, lights[l]->sample_towards(p[l], {u_light_x[l], u_light_y[l]}, u_primitive[l]));
+    if (is_open_[l] && lights[l] != environment)
+      set_light(l, lights[l]->sample_towards(p[l], {u_light_x[l], u_light_y[l]}, u_primitive[l]));
+  if (!environment) return;
+  EnvironmentQueue queue(*environment);
+  const auto set = [this](uint32_t l, const EmitterSample& sample) { set_light(static_cast<int>(l), sample); };
+  for (int l = 0; l < size_; ++l)
+    if (lights[l] == environment) queue.add(static_cast<uint32_t>(l), {u_light_x[l], u_light_y[l]}, set);
+  queue.finish(set);
 }
 
 void LambertianBlock::set_parallelogram(int l, const ParallelogramLight& light) {

@@ -73,9 +73,15 @@ struct EnvironmentLight {
   float pdf_solid_angle = 0;  ///< density of sample_towards() at the direction
 };
 
-enum class PrefetchStep {
-  kTable,   ///< the entry of a sampling table
-  kValues,  ///< the values that the entry refers to
+/// Samples of an environment for up to kCapacity points, as structure of arrays.
+struct EnvironmentSamples {
+  static constexpr int kCapacity = 64;
+  int size = 0;
+  // Numbers, uniform in [0, 1)^2, that the samples are made from.
+  alignas(64) float u_x[kCapacity] = {}, u_y[kCapacity] = {};
+  // As in EmitterSample.
+  alignas(64) float wi_x[kCapacity], wi_y[kCapacity], wi_z[kCapacity];
+  alignas(64) float r[kCapacity], g[kCapacity], b[kCapacity], pdf_solid_angle[kCapacity];
 };
 
 class Emitter : public SceneObject {
@@ -102,9 +108,6 @@ class Emitter : public SceneObject {
   /// Radiance along a ray leaving the scene in world direction `d`; environments only.
   virtual EnvironmentLight environment(const Vec3& /*d*/) const { return {}; }
 
-  /// Prefetches what sample_towards() will read for this `u`, step by step, for many samples before the first is taken.
-  /// Does not change results.
-  virtual void prefetch(Vec2 /*u*/, PrefetchStep) const {}
   /// Samples the light as seen from `reference`. `u` uniform in [0,1)^2, `u_primitive` a third number.
   virtual EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const = 0;
   /// Density of sample_towards() per unit solid angle at `reference` for the point `hit` on this area light.
@@ -133,6 +136,9 @@ class Emitter : public SceneObject {
   virtual const ParallelogramLight* parallelogram() const { return nullptr; }
   /// The same for a sphere.
   virtual const SphereLight* sphere() const { return nullptr; }
+  /// Takes sample_towards() of an environment for many points at once, up to rounding. False, and nothing is done, if
+  /// this environment cannot.
+  virtual bool sample_environment(EnvironmentSamples& /*samples*/) const { return false; }
 
   /// This environment with the mean subtracted from its density, for use with a technique that covers all directions
   /// [Karlik2019]; null if that is the light itself.
