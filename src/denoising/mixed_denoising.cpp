@@ -274,12 +274,14 @@ Run run_of_pair(const Estimator& base, const MixedDenoisingOptions& options, boo
 }
 
 /// Without a network, from so many samples per pixel on, NL-means of the image itself is worth its time beside the
-/// regression; measured (docs/notes/denoising.md).
+/// regression; measured (docs/notes/denoising.md). With history it always is: candidates that differ show how wrong a
+/// frame is, which limits what previous frames may change (docs/notes/sequences.md).
 constexpr double kManySamples = 64;
 
-FilterKinds kinds_for(const GroupedImage& image, bool with_network) {
+FilterKinds kinds_for(const GroupedImage& image, bool with_network, const MixingHistory& history) {
   if (with_network) return FilterKinds::kNlMeans;
-  return mean_samples(image) < kManySamples ? FilterKinds::kRegression : FilterKinds::kAll;
+  const bool worth_it = mean_samples(image) >= kManySamples || history.before || history.keep_samples;
+  return worth_it ? FilterKinds::kAll : FilterKinds::kRegression;
 }
 
 Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
@@ -287,7 +289,8 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
     check_guides(settings.guides);
     std::vector<CandidateMaker> makers;
     if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn, CandidateBase::kMean));
-    makers.push_back(filtered_candidates(settings.guides, CandidateBase::kMean, kinds_for(independent, with_oidn)));
+    makers.push_back(
+        filtered_candidates(settings.guides, CandidateBase::kMean, kinds_for(independent, with_oidn, options.history)));
     if (!can_be_mixed(independent)) return single_candidate(independent, makers, settings.layers);
     return denoise_frame(parts_of_mean(independent), makers, options, settings, settings.layers);
   };
