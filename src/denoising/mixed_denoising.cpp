@@ -280,7 +280,7 @@ constexpr double kManySamples = 64;
 
 FilterKinds kinds_for(const GroupedImage& image, bool with_network, const MixingHistory& history) {
   if (with_network) return FilterKinds::kNlMeans;
-  const bool worth_it = mean_samples(image) >= kManySamples || history.before || history.keep_samples;
+  const bool worth_it = mean_samples(image) >= kManySamples || history.before;
   return worth_it ? FilterKinds::kAll : FilterKinds::kRegression;
 }
 

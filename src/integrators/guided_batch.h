@@ -68,9 +68,11 @@ struct ControlStep {
 };
 
 struct GuidedPathState : PathState {
-  Spectrum bsdf_throughput{1};  ///< the throughput if the BSDF had sampled all directions
-  uint32_t last_vertex = 0;     ///< address of the numbers of the last vertex
-  bool recorded = false;        ///< the last direction sample is the last recorded one of the path
+  Spectrum bsdf_throughput{1};          ///< the throughput if the BSDF had sampled all directions
+  uint32_t last_vertex = 0;             ///< address of the numbers of the last vertex
+  uint32_t leaf = GuidingField::kNone;  ///< of the last surface with more than delta lobes
+  float first_value = 0;  ///< throughput times GuidingLeaf::outgoing at the first vertex where the latter is known
+  bool recorded = false;  ///< the last direction sample is the last recorded one of the path
 };
 
 struct GuidedConnection {
@@ -94,13 +96,15 @@ struct GuidedBatch final : CameraBatch<GuidedPathState, LightSetChoice, GuidedCo
     GuidingSample sample;
     Spectrum throughput;  ///< of the path after it
     Spectrum before;      ///< radiance of the path before the direction was followed
+    Spectrum arriving;    ///< throughput of the path before its vertex
+    Spectrum on_arrival;  ///< radiance of the path without the vertex's light samples
   };
   /// Maximum number of recorded direction samples of a path.
   static constexpr uint32_t kMaxSteps = 16;
 
   void start(size_t n) {
     CameraBatch::start(n, 2);
-    if (vertices.size() < n) environments.resize(n), leaves.resize(n), vertices.resize(n);
+    if (vertices.size() < n) environments.resize(n), vertices.resize(n);
     for (size_t i = 0; i < n; ++i) vertices[i].active = false;
     control_steps.clear(), control_samples.clear();
     if (!recording) return;
@@ -111,7 +115,6 @@ struct GuidedBatch final : CameraBatch<GuidedPathState, LightSetChoice, GuidedCo
   Step& last_step(uint32_t sample) { return steps[sample * kMaxSteps + n_steps[sample] - 1]; }
 
   std::vector<EmitterSample> environments;
-  std::vector<uint32_t> leaves;                 ///< of the guiding field
   std::vector<uint32_t> ended;                  ///< samples whose paths ended at their last vertex, which has a control
   std::vector<ControlledVertexState> vertices;  ///< the last vertex of each path, by Path::sample
   std::vector<ConnectionParts> connection_parts;

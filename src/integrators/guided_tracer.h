@@ -7,8 +7,9 @@
 //
 // as is the density that light samples are weighted against (balance heuristic). Hence the estimate is unbiased for any
 // field. g is the fraction of guided directions times the probability of the BSDF lobes that guiding can replace:
-// neither delta nor narrow lobes. Russian roulette uses the throughput that the path would have with BSDF sampling:
-// guided directions of high density have low throughput, which is no reason to end their paths.
+// neither delta nor narrow lobes. Russian roulette is driven by what paths are expected to bring [Vorba2016]; before
+// that is known, it uses the throughput that the path would have with BSDF sampling: guided directions of high density
+// have low throughput, which is no reason to end their paths.
 //
 // guided_surface.h has the mixture, guided_vertex_control.h the control variates of --cv. `Parts` is what tests replace
 // to plant bugs; see GuidedParts.
@@ -61,8 +62,15 @@ class GuidedTracer {
     control_.close(path.sample);
   }
 
-  /// Roulette uses the throughput of BSDF sampling; see above.
+  /// Russian roulette; see above.
   bool goes_on(int depth, Path& path) {
+    if (field_.n_leaves() > 0) {
+      const SurfaceHit& hit = batch_.hits[static_cast<size_t>(&path - batch_.paths.data())];
+      if (!(hit.bsdf_flags & kSmooth)) return true;
+      path.leaf = field_.find(hit.p);
+      if (const float outgoing = field_.leaf(path.leaf).outgoing; outgoing > 0)
+        return is_worth_it(depth, path, outgoing);
+    }
     if (depth < lengths_.rr_depth) return true;
     const float weight =
         play_roulette(roulette::Parts(), path, path.bsdf_throughput, path.last_vertex, samples_[path.sample]);
@@ -72,7 +80,7 @@ class GuidedTracer {
   }
 
   void sample_lights(int depth) {
-    find_leaves();
+    prefetch_leaves();
     const bool any_light = guided_.lights && (!guided_.lights->empty() || guided_.environment);
     connecting_ = any_light && depth + 2 >= lengths_.min_depth;
     if (connecting_) {
@@ -106,11 +114,12 @@ class GuidedTracer {
       batch_.ended.push_back(path.sample);
       return false;
     }
+    const Spectrum arriving = path.throughput;
     scatter_path(path, next);
     path.bsdf_throughput *= next.weight * (direction.pdf_bsdf > 0 ? next.pdf / direction.pdf_bsdf : 1);
     const Vec3 wi = hit.frame.to_world(next.wi);
     lead_on(path, batch_.rays[i], hit, next, wi);
-    if (batch_.recording && !next.is_delta() && guide_.guidable > 0) record(path, hit.p, wi, direction);
+    if (batch_.recording && !next.is_delta() && guide_.guidable > 0) record(path, arriving, hit.p, wi, direction);
     return true;
   }
 
@@ -123,6 +132,26 @@ class GuidedTracer {
   }
 
  private:
+  /// Adjoint-driven roulette [Vorba2016] (Sec. 5): ends paths whose expected contribution, throughput times learnt
+  /// radiance, has fallen far below that at their first vertex. `outgoing`: of the leaf.
+  bool is_worth_it(int depth, Path& path, float outgoing) {
+    const float value = max_component(path.throughput) * outgoing;
+    if (path.first_value == 0) {
+      path.first_value = value;
+      return true;
+    }
+    float survival = kWorthRatio * value / path.first_value;
+    CameraSample& sample = samples_[path.sample];
+    if (sample.random.sampling() == Sampling::kCrn) survival = std::sqrt(std::sqrt(survival));  // as in roulette.h
+    survival = std::max(survival, kLeastSurvival);
+    if (depth >= lengths_.rr_depth) survival = std::min(survival, 0.95f);  // every path ends
+    if (survival >= 1) return true;
+    if (!(sample.random.get_1d(path.last_vertex, Event::kRoulette) < survival)) return false;
+    const float weight = roulette::survivor_weight(survival);
+    path.throughput *= weight, path.bsdf_throughput *= weight;
+    return true;
+  }
+
   /// Sets `r_light` and `light_cluster` if a light sample could have found the same point.
   void add_emission(int depth, size_t i, float& r_light, uint32_t& light_cluster) {
     const Path& path = batch_.paths[i];
@@ -148,13 +177,12 @@ class GuidedTracer {
     samples_[path.sample].radiance += radiance * r;
   }
 
-  /// Finds the leaves of the vertices before they are read.
-  void find_leaves() {
+  /// Prefetches the leaves of the vertices, which goes_on() has found.
+  void prefetch_leaves() {
     if (field_.n_leaves() == 0) return;
     for (size_t i = 0; i < batch_.paths.size(); ++i) {
       if (!(batch_.hits[i].bsdf_flags & kSmooth)) continue;
-      batch_.leaves[i] = field_.find(batch_.hits[i].p);
-      const GuidingLeaf& leaf = field_.leaf(batch_.leaves[i]);
+      const GuidingLeaf& leaf = field_.leaf(batch_.paths[i].leaf);
       for (size_t line = 0; line < sizeof leaf; line += 64)
         __builtin_prefetch(reinterpret_cast<const char*>(&leaf) + line);
     }
@@ -166,7 +194,7 @@ class GuidedTracer {
     if (!(hit.bsdf_flags & kSmooth) || (field_.n_leaves() == 0 && !batch_.recording)) return;
     guide_.guidable = guidable_fraction(bsdf, wo, guided_.min_roughness);
     if (field_.n_leaves() == 0) return;
-    guide_.leaf = batch_.leaves[i];
+    guide_.leaf = batch_.paths[i].leaf;
     guide_.see(guided_, hit, wo);
   }
 
@@ -223,13 +251,14 @@ class GuidedTracer {
   }
 
   /// Records a direction sample of the path.
-  void record(Path& path, const Vec3& p, const Vec3& wi, const GuidedDirection& direction) {
+  void record(Path& path, const Spectrum& arriving, const Vec3& p, const Vec3& wi, const GuidedDirection& direction) {
     uint32_t& n = batch_.n_steps[path.sample];
     if (n == GuidedBatch::kMaxSteps) return;
     ++n;
     path.recorded = true;
     GuidedBatch::Step& step = batch_.last_step(path.sample);
     step.throughput = path.throughput;
+    step.arriving = arriving, step.on_arrival = samples_[path.sample].radiance;
     step.sample = {.position = p,
                    .direction = wi,
                    .pdf = direction.sample.pdf,
@@ -244,21 +273,28 @@ class GuidedTracer {
       if (path.recorded) batch_.last_step(path.sample).before = samples_[path.sample].radiance;
   }
 
-  /// Computes the radiance that arrived along each recorded direction: the path's later contributions over its
-  /// throughput.
+  /// Computes the radiance that arrived along each recorded direction, and that its vertex sent along the path: the
+  /// path's later contributions over its throughput.
   void finish_steps() {
     for (uint32_t i = 0; i < samples_.size(); ++i)
       for (uint32_t n = 0; n < batch_.n_steps[i]; ++n) {
         GuidedBatch::Step& step = batch_.steps[i * GuidedBatch::kMaxSteps + n];
-        const Spectrum gained = samples_[i].radiance - step.before;
-        float radiance = 0;
-        for (int c = 0; c < 3; ++c)
-          if (step.throughput[c] > 0) radiance += std::max(gained[c], 0.0f) / step.throughput[c] * (1.0f / 3);
-        step.sample.weight = radiance / step.sample.pdf;
+        const auto since = [&](const Spectrum& before, const Spectrum& throughput) {
+          const Spectrum gained = samples_[i].radiance - before;
+          float radiance = 0;
+          for (int c = 0; c < 3; ++c)
+            if (throughput[c] > 0) radiance += std::max(gained[c], 0.0f) / throughput[c] * (1.0f / 3);
+          return radiance;
+        };
+        step.sample.weight = since(step.before, step.throughput) / step.sample.pdf;
+        step.sample.outgoing = since(step.on_arrival, step.arriving);
         batch_.records.push_back(step.sample);
       }
   }
 
+  /// Roulette ends no path that is expected to bring more than 1 / kWorthRatio of what its first vertex was
+  /// (docs/notes/guiding.md); so few survivors get large weights.
+  static constexpr float kWorthRatio = 8, kLeastSurvival = 0.1f;
   static constexpr TechniqueDensities kNoWeights{};
   const Scene& scene_;
   const GuidedScene& guided_;

@@ -368,7 +368,7 @@ TEST_F(TrainingFile, IsRefusedWhenItIsSomethingElse) {
             refused(bytes_, "scene 2"));
   std::string newer = bytes_;
   newer[20] = 9;
-  EXPECT_EQ("a.training: is a training file of version 9; this program reads version 2", refused(newer, "scene 1"));
+  EXPECT_EQ("a.training: is a training file of version 9; this program reads version 3", refused(newer, "scene 1"));
   std::string damaged = bytes_;
   damaged[damaged.size() - 20] ^= 1;
   EXPECT_EQ("a.training: is damaged: its content does not match its checksum", refused(damaged, "scene 1"));

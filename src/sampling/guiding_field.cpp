@@ -14,7 +14,8 @@ namespace {
 
 bool usable(const GuidingSample& s) {
   return is_finite(s.position) && is_finite(s.direction) && std::isfinite(s.weight) && s.weight >= 0 &&
-         std::isfinite(s.pdf) && s.pdf > 0 && std::isfinite(s.inverse_distance) && s.inverse_distance >= 0;
+         std::isfinite(s.pdf) && s.pdf > 0 && std::isfinite(s.inverse_distance) && s.inverse_distance >= 0 &&
+         std::isfinite(s.outgoing) && s.outgoing >= 0;
 }
 
 /// Mean and variance of the positions, per axis.
@@ -91,6 +92,9 @@ GuidingLeaf GuidingField::fit_leaf(std::span<const GuidingSample> samples, const
                         static_cast<float>(extent.mean[2])};
   if (settings_.learn_fraction) leaf.fraction = best_guiding_fraction(samples);
   if (samples.size() < settings_.min_leaf_samples) return leaf;
+  double outgoing = 0;
+  for (const GuidingSample& s : samples) outgoing += s.outgoing;
+  leaf.outgoing = static_cast<float>(outgoing / static_cast<double>(samples.size()));
   VmfMixture start;
   if (const uint32_t old = before.find(leaf.mixture.pivot); old != kNone && before.leaf(old).mixture.lobes.n > 0)
     start = before.leaf(old).mixture.moved_to(leaf.mixture.pivot);
@@ -142,7 +146,8 @@ std::string GuidingField::body() const {
     append_bytes(bytes, node.position), append_bytes(bytes, node.axis), append_bytes(bytes, node.child);
   for (const GuidingLeaf& leaf : leaves_) {
     const VmfMixture& mixture = leaf.mixture;
-    append_bytes(bytes, leaf.fraction), append_bytes(bytes, mixture.pivot), append_bytes(bytes, mixture.lobes.n);
+    append_bytes(bytes, leaf.fraction), append_bytes(bytes, leaf.outgoing);
+    append_bytes(bytes, mixture.pivot), append_bytes(bytes, mixture.lobes.n);
     for (int k = 0; k < mixture.lobes.n; ++k)
       append_bytes(bytes, mixture.lobes.weight[k]), append_bytes(bytes, mixture.lobes.lobe(k)),
           append_bytes(bytes, mixture.inverse_distance[k]);
@@ -164,9 +169,11 @@ GuidingField GuidingField::from_body(std::string_view bytes, const std::string& 
   }
   for (GuidingLeaf& leaf : field.leaves_) {
     VmfMixture& mixture = leaf.mixture;
-    leaf.fraction = reader.read<float>(), mixture.pivot = reader.read<Vec3>();
+    leaf.fraction = reader.read<float>(), leaf.outgoing = reader.read<float>();
+    mixture.pivot = reader.read<Vec3>();
     mixture.lobes.n = reader.read<int>();
-    reader.check(mixture.lobes.n >= 0 && mixture.lobes.n <= VmfLobes::kMax && leaf.fraction > 0 && leaf.fraction < 1);
+    reader.check(mixture.lobes.n >= 0 && mixture.lobes.n <= VmfLobes::kMax && leaf.fraction > 0 && leaf.fraction < 1 &&
+                 leaf.outgoing >= 0 && std::isfinite(leaf.outgoing));
     for (int k = 0; k < mixture.lobes.n; ++k) {
       const auto weight = reader.read<float>();
       const auto lobe = reader.read<Vmf>();

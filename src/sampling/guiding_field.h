@@ -34,6 +34,7 @@ struct GuidingSettings {
 struct GuidingLeaf {
   VmfMixture mixture;     ///< without lobes: no guiding
   float fraction = 0.5f;  ///< learned fraction of directions sampled from the mixture, if learned
+  float outgoing = 0;     ///< mean of GuidingSample::outgoing; 0: too few samples
 };
 
 class GuidingField {

@@ -22,6 +22,7 @@ std::vector<GuidingSample> two_rooms(size_t n, uint64_t seed = 1) {
     const Vmf lobe{p.x < 0 ? Vec3{1, 0, 0} : Vec3{0, 1, 0}, 200};
     const Vec3 w = vmf::sample(lobe, random.get_2d(0, Event::kGuide));
     samples.push_back({.position = p, .direction = w, .weight = 1, .pdf = vmf::pdf(lobe, w)});
+    samples.back().outgoing = p.x < 0 ? 0.5f : (i % 2 ? 6.0f : 0.0f);
   }
   return samples;
 }
@@ -65,6 +66,14 @@ TEST(GuidingField, ALeafOfFewSamplesOrWithoutLightDoesNotGuide) {
   EXPECT_EQ(trained(samples).leaf(0).mixture.lobes.n, 0);
 }
 
+TEST(GuidingField, LeavesKnowTheMeanRadianceThatTheirSurfacesSend) {
+  const GuidingField field = trained(two_rooms(40000));
+  EXPECT_FLOAT_EQ(field.leaf(field.find({-0.9f, 0.5f, 0})).outgoing, 0.5f);
+  // n > 2000 values of variance 9: 5 standard errors.
+  EXPECT_NEAR(field.leaf(field.find({0.9f, 0.5f, 0})).outgoing, 3, 0.35);
+  EXPECT_EQ(trained(two_rooms(99)).leaf(0).outgoing, 0);  // too few samples
+}
+
 TEST(GuidingField, SamplesAtOnePointAreOneLeaf) {
   std::vector<GuidingSample> samples = two_rooms(5000);
   for (GuidingSample& s : samples) s.position = {1e-3f, 7, 1e5f};
@@ -93,8 +102,10 @@ TEST(GuidingField, LeavesOutWhatIsNoSample) {
   add([&](GuidingSample& s) { s.direction.y = nan; });
   add([&](GuidingSample& s) { s.position.x = infinity; });
   add([&](GuidingSample& s) { s.inverse_distance = nan; });
+  add([&](GuidingSample& s) { s.outgoing = nan; });
+  add([&](GuidingSample& s) { s.outgoing = -1; });
   const GuidingField field = trained(samples);
-  EXPECT_EQ(field.n_rejected(), 8u);
+  EXPECT_EQ(field.n_rejected(), 10u);
   EXPECT_EQ(field.hash(), clean.hash());
 }
 

@@ -10,7 +10,7 @@ namespace covary {
 namespace {
 
 constexpr std::string_view kMagic = "covary coefficients\n";
-constexpr uint32_t kVersion = 2;
+constexpr uint32_t kVersion = 3;
 
 }  // namespace
 

@@ -25,6 +25,7 @@ struct GuidingSample {
   /// For the learned fraction (guiding_field.h): densities of the BSDF and of the guide alone (0: no guide), and the
   /// fraction of BSDF samples that guiding may replace.
   float pdf_bsdf = 0, pdf_guide = 0, guidable = 0;
+  float outgoing = 0;  ///< radiance that `position` sends along the path, estimated by the rest of the path, at least 0
 };
 
 struct VmfFitSettings {
