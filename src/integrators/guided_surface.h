@@ -10,6 +10,7 @@
 #include "sampling/coefficient_table.h"
 #include "sampling/guiding_field.h"
 #include "sampling/light_set.h"
+#include "sampling/roulette.h"
 #include "scene/bsdf.h"
 #include "scene/surface_hit.h"
 
@@ -35,6 +36,8 @@ struct GuidedParts {
   static constexpr bool kCountFailed = true;
   /// The cell of the coefficients for a direction at a vertex whose Σ N β comes from `cell`.
   static uint32_t direction_cell(uint32_t cell, uint32_t /*n_cells*/) { return cell; }
+  /// Factor on the throughput of survivors of roulette.
+  static float survivor_weight(float survival) { return roulette::survivor_weight(survival); }
   /// Samples a direction from the lobes `guide` of a leaf.
   static Vec3 sample_guide(const VmfLobes& guide, const GuidingField&, uint32_t /*leaf*/, float u_lobe, Vec2 u) {
     return guide.sample(u_lobe, u);

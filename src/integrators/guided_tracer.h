@@ -66,10 +66,10 @@ class GuidedTracer {
   bool goes_on(int depth, Path& path) {
     if (field_.n_leaves() > 0) {
       const SurfaceHit& hit = batch_.hits[static_cast<size_t>(&path - batch_.paths.data())];
-      if (!(hit.bsdf_flags & kSmooth)) return true;
+      if (!(hit.bsdf_flags & kSmooth)) return survives(depth, path, 1);  // nothing is learnt about mirrors
       path.leaf = field_.find(hit.p);
       if (const float outgoing = field_.leaf(path.leaf).outgoing; outgoing > 0)
-        return is_worth_it(depth, path, outgoing);
+        return survives(depth, path, worth(path, outgoing));
     }
     if (depth < lengths_.rr_depth) return true;
     const float weight =
@@ -132,22 +132,22 @@ class GuidedTracer {
   }
 
  private:
-  /// Adjoint-driven roulette [Vorba2016] (Sec. 5): ends paths whose expected contribution, throughput times learnt
-  /// radiance, has fallen far below that at their first vertex. `outgoing`: of the leaf.
-  bool is_worth_it(int depth, Path& path, float outgoing) {
+  /// Survival probability of adjoint-driven roulette [Vorba2016] (Sec. 5), not limited: the expected contribution,
+  /// throughput times the learnt radiance `outgoing` of the leaf, relative to that at the path's first vertex.
+  float worth(Path& path, float outgoing) const {
     const float value = max_component(path.throughput) * outgoing;
-    if (path.first_value == 0) {
-      path.first_value = value;
-      return true;
-    }
-    float survival = kWorthRatio * value / path.first_value;
-    CameraSample& sample = samples_[path.sample];
-    if (sample.random.sampling() == Sampling::kCrn) survival = std::sqrt(std::sqrt(survival));  // as in roulette.h
+    if (path.first_value == 0) path.first_value = value;
+    const float ratio = kWorthRatio * value / path.first_value;
+    // The root is that of roulette.h.
+    return samples_[path.sample].random.sampling() == Sampling::kCrn ? std::sqrt(std::sqrt(ratio)) : ratio;
+  }
+
+  bool survives(int depth, Path& path, float survival) {
     survival = std::max(survival, kLeastSurvival);
     if (depth >= lengths_.rr_depth) survival = std::min(survival, 0.95f);  // every path ends
     if (survival >= 1) return true;
-    if (!(sample.random.get_1d(path.last_vertex, Event::kRoulette) < survival)) return false;
-    const float weight = roulette::survivor_weight(survival);
+    if (!(samples_[path.sample].random.get_1d(path.last_vertex, Event::kRoulette) < survival)) return false;
+    const float weight = Parts::survivor_weight(survival);
     path.throughput *= weight, path.bsdf_throughput *= weight;
     return true;
   }
@@ -292,8 +292,8 @@ class GuidedTracer {
       }
   }
 
-  /// Roulette ends no path that is expected to bring more than 1 / kWorthRatio of what its first vertex was
-  /// (docs/notes/guiding.md); so few survivors get large weights.
+  /// Before `rr_depth`, roulette ends no path that is expected to bring more than 1 / kWorthRatio of what it was at its
+  /// first vertex, so that few survivors get large weights (docs/notes/guiding.md).
   static constexpr float kWorthRatio = 8, kLeastSurvival = 0.1f;
   static constexpr TechniqueDensities kNoWeights{};
   const Scene& scene_;

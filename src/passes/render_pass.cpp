@@ -224,6 +224,7 @@ void render_tiles(size_t n, LearningIntegrator* learner, const Integrator& integ
   }
 }
 
+/// Checks that an integrator that learns is trained, or learns from this pass.
 void check_learner(const Integrator& integrator, const PassSettings& settings, const Film& film) {
   const LearningIntegrator* learning = integrator.learning();
   const LearningIntegrator* learner = settings.learner;

@@ -28,6 +28,11 @@ struct NoBsdfDensity : GuidedParts {
   }
 };
 
+/// Survivors of roulette do not stand for the paths that it ends.
+struct LightSurvivors : GuidedParts {
+  static float survivor_weight(float) { return 1; }
+};
+
 /// Failed directions are left out of the control variate.
 struct FailedForgotten : GuidedParts {
   static constexpr bool kCountFailed = false;
@@ -117,6 +122,29 @@ TEST(GuidedPath, HasLessNoiseWhereLightIsHardToFind) {
   const double hardly = noise(trained(xml, options(false, 0.01f))), half = noise(trained(xml, options(false)));
   EXPECT_LT(half, 0.2 * hardly);
   EXPECT_LT(noise(trained(xml, options(false, GuideSettings::kLearnedFraction))), 0.7 * half);
+}
+
+TEST(GuidedPath, RouletteIsUnbiased) {
+  const std::string xml = everything(kRoulette);
+  const TestScene path = load_text(xml), scene = trained(xml, options(true));
+  EXPECT_EQ(n_biased(differences(scene, path, 16, 100)), 0);
+  // With the same random numbers, only the weights of survivors differ.
+  EXPECT_GT(n_biased(differences(with_bug<LightSurvivors>(xml, options(true), scene), scene, 16, 0)), 0);
+}
+
+TEST(GuidedPath, PathsBetweenMirrorsEnd) {
+  const std::string mirrors = sphere("x='0' y='0' z='0'",
+                                     "<float name='radius' value='20'/><boolean name='flip_normals' value='true'/>"
+                                     "<bsdf type='conductor'><string name='material' value='none'/></bsdf>");
+  const TestScene scene = trained(
+      scene_text(mirrors + kFloor + sphere("x='0' y='3' z='3'", "<emitter type='area'/>"), kSide, kSide, -1, kWide),
+      options(true));
+  EXPECT_GT(integrator_of(scene).field().n_leaves(), 0u);
+  Film film = new_film(scene);
+  PassSettings settings;
+  settings.spp = 4;
+  // From an edge of 5 on, a path goes on with 0.95 at most: 25 edges, with a light sample each.
+  EXPECT_LT(render_pass(scene.scene(), scene.integrator(), settings, film).n_rays, 4u * kSide * kSide * 50);
 }
 
 TEST(GuidedPath, ControlledAgreesWithPath) {
