@@ -66,7 +66,8 @@ class GuidedTracer {
   bool goes_on(int depth, Path& path) {
     if (field_.n_leaves() > 0) {
       const SurfaceHit& hit = batch_.hits[static_cast<size_t>(&path - batch_.paths.data())];
-      if (!(hit.bsdf_flags & kSmooth)) return survives(depth, path, 1);  // nothing is learnt about mirrors
+      // Nothing is learnt about mirrors and clear glass, which bright paths may meet often: they end paths late.
+      if (!(hit.bsdf_flags & kSmooth)) return depth < 4 * lengths_.rr_depth || survives(depth, path, 1);
       path.leaf = field_.find(hit.p);
       if (const float outgoing = field_.leaf(path.leaf).outgoing; outgoing > 0)
         return survives(depth, path, worth(path, outgoing));
