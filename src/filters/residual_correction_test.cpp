@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "filters/planes.h"
+
 namespace covary {
 namespace {
 
