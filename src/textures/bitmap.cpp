@@ -8,13 +8,15 @@
 // | filter_type | string    | bilinear | `bilinear` or `nearest`                                                      |
 // | wrap_mode   | string    | repeat   | outside [0, 1]: `repeat`, `mirror` or `clamp`                                |
 // | to_uv       | transform | identity | from surface parameters to texture coordinates                               |
+// | grey        | string    | luminance | one channel of colours, or `alpha_or_mean`, as in pbrt                      |
 // | format      | string    | auto     | accepted for compatibility; bytes stay bytes, other files become floats      |
 // | accel       | boolean   | true     | accepted for compatibility; no effect                                        |
 //
-// A one-channel lookup gives the grey value, or the luminance of a colour (of a raw one, too). Differences from Mitsuba
-// 3.9: the gradient follows the chain rule for any to_uv (there, only for square images or diagonal to_uv); 16-bit
-// files keep full precision; lights sample positions uniformly if to_uv does not preserve the unit square (an error
-// there).
+// A one-channel lookup gives the grey value, or the luminance of a colour (of a raw one, too), unless `grey` is
+// `alpha_or_mean`: alpha, if the image has colours and is not opaque, otherwise the mean of the colour's channels.
+// Differences from Mitsuba 3.9: the gradient follows the chain rule for any to_uv (there, only for square images or
+// diagonal to_uv); 16-bit files keep full precision; lights sample positions uniformly if to_uv does not preserve the
+// unit square (an error there).
 #include "textures/bitmap.h"
 
 #include <array>
@@ -301,11 +303,13 @@ std::shared_ptr<Texture> make_bitmap(Parameters& parameters) {
   const std::string wrap = parameters.get_choice("wrap_mode", "repeat", {"repeat", "mirror", "clamp"});
   settings.wrap = wrap == "mirror" ? WrapMode::kMirror : (wrap == "clamp" ? WrapMode::kClamp : WrapMode::kRepeat);
   settings.to_uv = UvTransform(parameters.get_transform("to_uv"));
+  const bool mean = parameters.get_choice("grey", "luminance", {"luminance", "alpha_or_mean"}) == "alpha_or_mean";
   parameters.get_choice("format", "auto", {"auto", "variant", "float16", "fp16", "uint8"});
   parameters.get_bool("accel", true);
   if (path.empty() && !data) return nullptr;  // already reported
   try {
-    return make_bitmap_texture(data ? read_embedded_image(*data) : read_texels(path), settings);
+    if (data) return make_bitmap_texture(read_embedded_image(*data), settings);
+    return make_bitmap_texture(mean ? read_alpha_or_mean(path, settings.raw) : read_texels(path), settings);
   } catch (const Error& error) {
     parameters.error_at("filename", std::string("cannot be used: ") + error.what());
     return nullptr;

@@ -122,6 +122,32 @@ TexelImage read(const std::string& path, BytesPerPixel bytes_per_pixel) {
 
 TexelImage read_texels(const std::string& path) { return read(path, bytes_of_texture); }
 
+TexelImage read_alpha_or_mean(const std::string& path, bool raw) {
+  {
+    const std::unique_ptr<ImageReader> file = open_image(path, OtherColours::kKeep);
+    const ImageHeader& header = file->header();
+    if (const int alpha = header.alpha_channel; alpha >= 0 && header.channels.size() > 3) {
+      TexelImage image;
+      image.width = header.width, image.height = header.height, image.channels = 1;
+      image.srgb = !header.floating_point;
+      require_memory(path, fmt::format("the alpha of {} x {} pixels", header.width, header.height),
+                     sizeof(float) * static_cast<double>(image.n_pixels()));
+      image.floats = file->read_floats(alpha, alpha + 1);
+      check_finite(image, path);
+      if (std::any_of(image.floats.begin(), image.floats.end(), [](float a) { return a != 1; })) return image;
+    }
+  }
+  TexelImage image = read_texels(path);
+  if (image.channels == 1) return image;
+  std::vector<float> means(image.n_pixels());
+  for (size_t i = 0; i < 3 * means.size(); ++i) {
+    const float value = image.bytes.empty() ? image.floats[i] : static_cast<float>(image.bytes[i]) / 255;
+    means[i / 3] += (image.srgb && !raw ? srgb_to_linear(value) : value) / 3;
+  }
+  image.channels = 1, image.bytes.clear(), image.floats = std::move(means), image.srgb = false;
+  return image;
+}
+
 TexelImage read_linear_rgb(const std::string& path) {
   const TexelImage source = read(path, bytes_of_environment);
   const size_t n_values = source.n_pixels() * source.channels;

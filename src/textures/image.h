@@ -25,6 +25,11 @@ struct TexelImage {
 /// green and blue nor grey channels, or holds a value that is not finite.
 TexelImage read_texels(const std::string& path);
 
+/// pbrt's grey values of an image: alpha, if the image has colours and an alpha that is not 1 everywhere, otherwise the
+/// mean of linear red, green and blue. Integers are sRGB-encoded, alpha too, unless they are `raw`. Throws like
+/// read_texels.
+TexelImage read_alpha_or_mean(const std::string& path, bool raw);
+
 /// The image as linear RGB floats, three per pixel; throws like read_texels.
 TexelImage read_linear_rgb(const std::string& path);
 

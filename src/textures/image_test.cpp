@@ -7,6 +7,7 @@
 
 #include <fstream>
 
+#include "core/srgb.h"
 #include "support/describe.h"
 #include "support/files.h"
 #include "support/leaks.h"
@@ -54,6 +55,39 @@ TEST(Image, RejectsWhatIsNotAnImage) {
     write(path, "");
     EXPECT_NE(error_of(path).find(path), std::string::npos) << name << ": " << error_of(path);
   }
+}
+
+/// pbrt's mipmap.cpp, Bilerp<Float>: alpha of images that are not opaque, otherwise the mean of linear colours.
+TEST(Image, NumbersAreAlphaOrTheMean) {
+  const TemporaryFolder folder;
+  const auto write_pixel = [&](const char* name, const std::vector<std::string>& channels, std::vector<uint8_t> pixel) {
+    const auto output = OIIO::ImageOutput::create(folder.file(name));
+    ASSERT_TRUE(output);
+    OIIO::ImageSpec spec(1, 1, static_cast<int>(channels.size()), OIIO::TypeDesc::UINT8);
+    spec.channelnames = channels;
+    spec.attribute("oiio:UnassociatedAlpha", 1);
+    ASSERT_TRUE(output->open(folder.file(name), spec)) << output->geterror();
+    ASSERT_TRUE(output->write_image(OIIO::TypeDesc::UINT8, pixel.data()));
+    ASSERT_TRUE(output->close());
+  };
+  write_pixel("leaf.png", {"R", "G", "B", "A"}, {255, 0, 0, 51});
+  write_pixel("opaque.png", {"R", "G", "B", "A"}, {255, 51, 0, 255});
+  write_pixel("colour.png", {"R", "G", "B"}, {255, 51, 0});
+  write_pixel("grey.png", {"Y"}, {51});
+  const auto value = [&](const char* name, bool raw) {
+    const TexelImage image = read_alpha_or_mean(folder.file(name), raw);
+    EXPECT_EQ(image.channels, 1) << name;
+    const float stored = image.bytes.empty() ? image.floats.at(0) : static_cast<float>(image.bytes.at(0)) / 255;
+    return image.srgb && !raw ? srgb_to_linear(stored) : stored;
+  };
+  const float low = srgb_to_linear(0.2f);
+  EXPECT_NEAR(value("leaf.png", false), low, 1e-6f);
+  EXPECT_NEAR(value("leaf.png", true), 0.2f, 1e-6f);
+  for (const char* name : {"opaque.png", "colour.png"}) {
+    EXPECT_NEAR(value(name, false), (1 + low) / 3, 1e-6f) << name;
+    EXPECT_NEAR(value(name, true), 1.2f / 3, 1e-6f) << name;
+  }
+  EXPECT_NEAR(value("grey.png", false), low, 1e-6f);
 }
 
 TEST(Image, RejectsTruncatedFiles) {
