@@ -32,6 +32,19 @@ const Json kThin{
     {"type", "principledthin"}, {"spec_trans", 0.6}, {"diff_trans", 0.9}, {"roughness", 0.6}, {"eta", 1.4}};
 const Json kPrincipled{{"type", "principled"}, {"spec_trans", 0.5}, {"roughness", 0.4}, {"clearcoat", 0.7},
                        {"sheen", 0.5},         {"metallic", 0.2},   {"spec_tint", 0.5}, {"flatness", 0.3}};
+Json metallic_roughness(double transmission, bool thin) {
+  return {{"type", "metallicroughness"},
+          {"base_color", rgb(0.8, 0.5, 0.2)},
+          {"metallic", 0.3},
+          {"roughness", 0.6},
+          {"clearcoat", 0.7},
+          {"clearcoat_roughness", 0.5},
+          {"specular", 0.8},
+          {"specular_color", rgb(3, 1, 0.5)},
+          {"ior", 1.7},
+          {"transmission", transmission},
+          {"thin", thin}};
+}
 
 Json mask(const Json& nested) { return {{"type", "mask"}, {"opacity", 0.7}, {"n", nested}}; }
 Json blend(const Json& a, const Json& b) { return {{"type", "blendbsdf"}, {"weight", 0.3}, {"a", a}, {"b", b}}; }
@@ -64,6 +77,9 @@ const Case kCases[] = {
     {"thindielectric", kPane},
     {"principled", kPrincipled},
     {"principledthin", kThin},
+    {"metallicroughness", metallic_roughness(0, true)},
+    {"metallicroughness_sheet", metallic_roughness(0.6, true)},
+    {"metallicroughness_solid", metallic_roughness(0.6, false)},
     {"null", {{"type", "null"}}},
     {"polarizer", {{"type", "polarizer"}, {"transmittance", 0.6}}},
     {"pplastic", {{"type", "pplastic"}, {"alpha", 0.3}}},
