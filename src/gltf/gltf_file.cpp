@@ -14,9 +14,10 @@ namespace covary {
 namespace {
 
 /// Supported extensions that affect the image.
-constexpr std::array kRead = {"KHR_lights_punctual",  "KHR_materials_clearcoat",    "KHR_materials_emissive_strength",
-                              "KHR_materials_ior",    "KHR_materials_transmission", "KHR_materials_unlit",
-                              "KHR_materials_volume", "KHR_mesh_quantization",      "KHR_texture_transform"};
+constexpr std::array kRead = {"KHR_lights_punctual",  "KHR_materials_clearcoat", "KHR_materials_emissive_strength",
+                              "KHR_materials_ior",    "KHR_materials_specular",  "KHR_materials_transmission",
+                              "KHR_materials_unlit",  "KHR_materials_volume",    "KHR_mesh_quantization",
+                              "KHR_texture_transform"};
 
 /// Images are decoded on demand.
 bool keep_encoded(tinygltf::Image* image, const int, std::string*, std::string*, int, int, const unsigned char* bytes,
@@ -190,6 +191,17 @@ const tinygltf::Value* find_extension(const tinygltf::ExtensionMap& extensions, 
 double extension_number(const tinygltf::Value& extension, const std::string& name, double fallback) {
   const tinygltf::Value& value = extension.Get(name);
   return value.IsNumber() ? value.GetNumberAsDouble() : fallback;
+}
+
+std::optional<tinygltf::TextureInfo> extension_texture(const tinygltf::Value& extension, const std::string& name) {
+  const tinygltf::Value& value = extension.Get(name);
+  if (!value.IsObject() || !value.Get("index").IsInt()) return std::nullopt;
+  tinygltf::TextureInfo info;
+  info.index = value.Get("index").GetNumberAsInt();
+  info.texCoord = value.Get("texCoord").IsInt() ? value.Get("texCoord").GetNumberAsInt() : 0;
+  if (const tinygltf::Value& extensions = value.Get("extensions"); extensions.IsObject())
+    for (const std::string& key : extensions.Keys()) info.extensions[key] = extensions.Get(key);
+  return info;
 }
 
 }  // namespace covary

@@ -4,6 +4,7 @@
 
 #include <tiny_gltf.h>
 
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -47,6 +48,8 @@ class GltfFile {
 std::string file_of_uri(const std::string& uri);
 /// An extension's object; null if absent.
 const tinygltf::Value* find_extension(const tinygltf::ExtensionMap& extensions, const std::string& name);
+/// The texture `name` of an extension, if it has one.
+std::optional<tinygltf::TextureInfo> extension_texture(const tinygltf::Value& extension, const std::string& name);
 double extension_number(const tinygltf::Value& extension, const std::string& name, double fallback);
 
 }  // namespace covary

@@ -16,7 +16,28 @@ Spectrum colour_of(const std::vector<double>& numbers, float fallback) {
   return colour;
 }
 
+/// The textures of extensions that are read.
+constexpr std::pair<const char*, const char*> kExtensionTextures[] = {
+    {"KHR_materials_specular", "specularTexture"},
+    {"KHR_materials_specular", "specularColorTexture"},
+    {"KHR_materials_transmission", "transmissionTexture"},
+    {"KHR_materials_clearcoat", "clearcoatTexture"},
+    {"KHR_materials_clearcoat", "clearcoatRoughnessTexture"}};
+
 double in_unit(double x) { return std::clamp(x, 0.0, 1.0); }
+
+Spectrum extension_colour(const tinygltf::Value& extension, const std::string& name, float fallback) {
+  std::vector<double> numbers;
+  const tinygltf::Value& value = extension.Get(name);
+  for (size_t c = 0; value.IsArray() && c < value.ArrayLen(); ++c)
+    numbers.push_back(value.Get(c).IsNumber() ? value.Get(c).GetNumberAsDouble() : fallback);
+  return colour_of(numbers, fallback);
+}
+
+bool is_transmissive(const tinygltf::Material& m) {
+  const tinygltf::Value* khr = find_extension(m.extensions, "KHR_materials_transmission");
+  return khr && extension_number(*khr, "transmissionFactor", 0) > 0;
+}
 
 }  // namespace
 
@@ -47,43 +68,57 @@ int GltfMaterials::texture_set(int material) {
   };
   see(m.pbrMetallicRoughness.baseColorTexture), see(m.pbrMetallicRoughness.metallicRoughnessTexture);
   see(m.normalTexture), see(m.emissiveTexture);
+  for (const auto& [extension, name] : kExtensionTextures)
+    if (const tinygltf::Value* khr = find_extension(m.extensions, extension))
+      if (const auto info = extension_texture(*khr, name)) see(*info);
   return std::max(set, 0);
+}
+
+void GltfMaterials::set_colour(ObjectDescription& model, const char* name, const tinygltf::TextureInfo& image,
+                               const Spectrum& factor) {
+  if (image.index < 0) return set_property(model, name, ColourValue{factor});
+  if (const ObjectPtr texture = textures_->make(image.index, image.extensions, {.factor = factor}))
+    set_property(model, name, texture);
+}
+
+void GltfMaterials::set_number(ObjectDescription& model, const char* name, const tinygltf::TextureInfo& image,
+                               int channel, double factor) {
+  if (image.index < 0) return set_property(model, name, in_unit(factor));
+  const Spectrum times(static_cast<float>(in_unit(factor)));
+  if (const ObjectPtr texture = textures_->make(image.index, image.extensions, {GltfUse::kChannel, channel, times}))
+    set_property(model, name, texture);
 }
 
 ObjectBuilder GltfMaterials::surface(const tinygltf::Material& m) {
   const tinygltf::PbrMetallicRoughness& pbr = m.pbrMetallicRoughness;
-  const tinygltf::Value* transmission = find_extension(m.extensions, "KHR_materials_transmission");
-  const double let_through = transmission ? in_unit(extension_number(*transmission, "transmissionFactor", 0)) : 0;
-  const tinygltf::Value* volume = find_extension(m.extensions, "KHR_materials_volume");
-  const bool thin = let_through > 0 && !(volume && extension_number(*volume, "thicknessFactor", 0) > 0);
-  auto model = make_object("bsdf", thin ? "principledthin" : "principled", file_.where());
-  const Spectrum colour = colour_of(pbr.baseColorFactor, 1);
-  if (pbr.baseColorTexture.index >= 0) {
-    if (const ObjectPtr texture =
-            textures_->make(pbr.baseColorTexture.index, pbr.baseColorTexture.extensions, {.factor = colour}))
-      set_property(*model, "base_color", texture);
-  } else {
-    set_property(*model, "base_color", ColourValue{colour});
-  }
-  const auto channel = [&](const char* name, int of, double factor) {
-    const tinygltf::TextureInfo& info = pbr.metallicRoughnessTexture;
-    if (info.index < 0) return set_property(*model, name, in_unit(factor));
-    const Spectrum times(static_cast<float>(in_unit(factor)));
-    if (const ObjectPtr texture = textures_->make(info.index, info.extensions, {GltfUse::kChannel, of, times}))
-      set_property(*model, name, texture);
+  auto model = make_object("bsdf", "metallicroughness", file_.where());
+  set_colour(*model, "base_color", pbr.baseColorTexture, colour_of(pbr.baseColorFactor, 1));
+  set_number(*model, "metallic", pbr.metallicRoughnessTexture, 2, pbr.metallicFactor);
+  set_number(*model, "roughness", pbr.metallicRoughnessTexture, 1, pbr.roughnessFactor);
+  const auto image = [](const tinygltf::Value& extension, const char* name) {
+    return extension_texture(extension, name).value_or(tinygltf::TextureInfo());
   };
-  channel("roughness", 1, pbr.roughnessFactor);
-  if (!thin) channel("metallic", 2, pbr.metallicFactor);
-  if (let_through > 0) set_property(*model, "spec_trans", let_through);
-  if (transmission && transmission->Has("transmissionTexture"))
-    file_.warn(fmt::format("the texture of material '{}' for what it lets through is not read", m.name));
   if (const tinygltf::Value* ior = find_extension(m.extensions, "KHR_materials_ior"))
-    set_property(*model, "eta", std::max(extension_number(*ior, "ior", 1.5), 1.0));
-  if (volume && volume->Has("attenuationColor"))
-    file_.warn(fmt::format("what the inside of material '{}' absorbs is not read", m.name));
-  if (const tinygltf::Value* coat = find_extension(m.extensions, "KHR_materials_clearcoat"); coat && !thin) {
-    set_property(*model, "clearcoat", in_unit(extension_number(*coat, "clearcoatFactor", 0)));
-    set_property(*model, "clearcoat_gloss", 1 - in_unit(extension_number(*coat, "clearcoatRoughnessFactor", 0)));
+    set_property(*model, "ior", std::max(extension_number(*ior, "ior", 1.5), 0.0));
+  if (const tinygltf::Value* khr = find_extension(m.extensions, "KHR_materials_specular")) {
+    set_number(*model, "specular", image(*khr, "specularTexture"), 3, extension_number(*khr, "specularFactor", 1));
+    set_colour(*model, "specular_color", image(*khr, "specularColorTexture"),
+               extension_colour(*khr, "specularColorFactor", 1));
+  }
+  if (const tinygltf::Value* khr = find_extension(m.extensions, "KHR_materials_transmission"); is_transmissive(m))
+    set_number(*model, "transmission", image(*khr, "transmissionTexture"), 0,
+               extension_number(*khr, "transmissionFactor", 0));
+  if (const tinygltf::Value* khr = find_extension(m.extensions, "KHR_materials_volume")) {
+    if (is_transmissive(m) && extension_number(*khr, "thicknessFactor", 0) > 0) set_property(*model, "thin", false);
+    if (khr->Has("attenuationColor"))
+      file_.warn(fmt::format("what the inside of material '{}' absorbs is not read", m.name));
+  }
+  if (const tinygltf::Value* khr = find_extension(m.extensions, "KHR_materials_clearcoat")) {
+    set_number(*model, "clearcoat", image(*khr, "clearcoatTexture"), 0, extension_number(*khr, "clearcoatFactor", 0));
+    set_number(*model, "clearcoat_roughness", image(*khr, "clearcoatRoughnessTexture"), 1,
+               extension_number(*khr, "clearcoatRoughnessFactor", 0));
+    if (khr->Has("clearcoatNormalTexture"))
+      file_.warn(fmt::format("the clear coat of material '{}' has the normals of its base, not its own", m.name));
   }
   return model;
 }
@@ -91,15 +126,9 @@ ObjectBuilder GltfMaterials::surface(const tinygltf::Material& m) {
 ObjectPtr GltfMaterials::make(const tinygltf::Material& m) {
   if (m.extensions.contains("KHR_materials_unlit"))
     file_.warn(fmt::format("material '{}' is unlit; it is rendered lit", m.name));
-  ObjectBuilder model = surface(m);
-  const bool thin = model->type == "principledthin";
-  const bool solid_glass = std::any_of(model->properties.begin(), model->properties.end(),
-                                       [](const Property& p) { return p.name == "spec_trans"; });
-  if (!thin && !solid_glass) {  // both sides are visible
-    auto sides = make_object("bsdf", "twosided", file_.where(), {{"", with_normals(m, model)}});
-    model = sides;
-  }
-  const ObjectPtr whole = thin || solid_glass ? with_normals(m, model) : ObjectPtr(model);
+  ObjectPtr whole = with_normals(m, surface(m));
+  if (!is_transmissive(m))  // opaque models are black from behind
+    whole = ObjectPtr(make_object("bsdf", "twosided", file_.where(), {{"", whole}}));
   const ObjectPtr result = with_opacity(m, whole);
   if (!m.name.empty()) std::const_pointer_cast<ObjectDescription>(result)->id = m.name;
   return result;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// glTF materials: metallic-roughness as `principled`, with textures, opacity, normal maps and emission.
+// glTF materials: `metallicroughness`, with textures, opacity, normal maps and emission.
 #pragma once
 
 #include <map>
@@ -28,6 +28,11 @@ class GltfMaterials {
   const tinygltf::Material& of(int material) const;
   ObjectPtr make(const tinygltf::Material& material);
   ObjectBuilder surface(const tinygltf::Material& material);
+  /// Sets a colour, or one channel of an image (0 to 3: R, G, B, A), times `factor`; the image counts if there is one.
+  void set_colour(ObjectDescription& model, const char* name, const tinygltf::TextureInfo& image,
+                  const Spectrum& factor);
+  void set_number(ObjectDescription& model, const char* name, const tinygltf::TextureInfo& image, int channel,
+                  double factor);
   ObjectPtr with_normals(const tinygltf::Material& material, ObjectPtr model);
   ObjectPtr with_opacity(const tinygltf::Material& material, ObjectPtr model);
 

@@ -165,7 +165,7 @@ TEST_F(GltfReader, IsTheSceneByHand) {
   const LoadedScene b = xml(kHead + kSquare + R"(
 <boolean name="face_normals" value="true"/><transform name="to_world"><rotate y="1" angle="45"/><scale value="1.2"/>
 <translate x=".1" y=".2" z="-.3"/></transform>
-<bsdf type="twosided"><bsdf type="principled"><texture type="bitmap" name="base_color">
+<bsdf type="twosided"><bsdf type="metallicroughness"><texture type="bitmap" name="base_color">
 <string name="filename" value="picture.png"/>
 <transform name="to_uv"><scale y="-1"/><translate y="1"/></transform></texture>
 <float name="metallic" value=".25"/><float name="roughness" value=".6"/></bsdf></bsdf></shape>)" +
@@ -173,7 +173,8 @@ TEST_F(GltfReader, IsTheSceneByHand) {
 <boolean name="face_normals" value="true"/><transform name="to_world"><scale value=".3"/>
 <translate x=".9" y=".8" z=".5"/></transform>
 <emitter type="area"><rgb name="radiance" value="8, 4, 2"/></emitter>
-<bsdf type="twosided"><bsdf type="principled"><rgb name="base_color" value="0"/><float name="metallic" value="1"/>
+<bsdf type="twosided"><bsdf type="metallicroughness"><rgb name="base_color" value="0"/>
+<float name="metallic" value="1"/>
 <float name="roughness" value="1"/></bsdf></bsdf></shape>
 <emitter type="point"><point name="position" x="0" y="2" z="1"/><rgb name="intensity" value="20, 16, 12"/></emitter>
 <emitter type="directional"><vector name="direction" x="0" y="-1" z="-1"/><rgb name="irradiance" value="3"/></emitter>
@@ -230,13 +231,61 @@ TEST_F(GltfReader, MaterialsAreThoseByHand) {
 <translate x=".25" y=".5"/>)";
   const LoadedScene b = xml(kHead + kSquare + R"(<bsdf type="mask"><float name="opacity" value="1"/>
 <bsdf type="twosided"><bsdf type="normalmap">)" +
-                            bitmap("normalmap", "picture.png", true, flip) + R"(<bsdf type="principled">
+                            bitmap("normalmap", "picture.png", true, flip) + R"(<bsdf type="metallicroughness">
 <texture type="scale" name="base_color"><rgb name="scale" value=".5, .25, 1"/>)" +
                             bitmap("t", "picture.png", false, moved) + "</texture>" +
                             bitmap("roughness", "rough.pfm", true, flip) + bitmap("metallic", "metal.pgm", true, flip) +
-                            R"(<float name="clearcoat" value=".5"/><float name="clearcoat_gloss" value=".75"/>
+                            R"(<float name="clearcoat" value=".5"/><float name="clearcoat_roughness" value=".25"/>
 </bsdf></bsdf></bsdf></bsdf></shape><emitter type="constant"/>)");
   test_support::expect_same_scene(a, b, 100);
+}
+
+/// The extensions' parameters, from images and as factors.
+TEST_F(GltfReader, ExtensionsOfMaterialsAreThoseByHand) {
+  write("square.ply", square_ply(true));
+  std::string red = "P5\n4 2\n255\n", green = red;
+  const std::string rgb = picture();
+  for (int i = 0; i < 8; ++i) red += rgb[3 * i], green += rgb[3 * i + 1];
+  write("red.pgm", red), write("green.pgm", green), write("picture.png", png());
+  const auto bitmap = [&](const char* name, const char* filename, bool raw) {
+    return fmt::format(R"(<texture type="bitmap" name="{}"><string name="filename" value="{}"/>
+<boolean name="raw" value="{}"/><transform name="to_uv"><scale y="-1"/><translate y="1"/></transform></texture>)",
+                       name, filename, raw);
+  };
+  const auto expect = [&](const json& extensions, const std::string& expected) {
+    Gltf file;
+    file.add_camera();
+    file.add("images", {{"bufferView", file.add_view(png())}, {"mimeType", "image/png"}});
+    file.add("textures", {{"source", 0}});
+    const int material = file.add(
+        "materials", {{"extensions", extensions},
+                      {"pbrMetallicRoughness",
+                       {{"baseColorFactor", {0.5, 0.25, 1, 1}}, {"metallicFactor", 0.25}, {"roughnessFactor", 0.5}}}});
+    file.add_root({{"mesh", file.add_square(material, true)}});
+    const LoadedScene b = xml(kHead + kSquare + expected + "</shape><emitter type=\"constant\"/>");
+    test_support::expect_same_scene(load(file), b, 100);
+  };
+  const std::string model = R"(<bsdf type="metallicroughness"><rgb name="base_color" value=".5, .25, 1"/>
+<float name="metallic" value=".25"/><float name="roughness" value=".5"/>)";
+  const json image = {{"index", 0}};
+  expect({{"KHR_materials_specular", {{"specularFactor", 0.75}, {"specularColorFactor", {2, 1, 0.5}}}},
+          {"KHR_materials_ior", {{"ior", 1.75}}}},
+         "<bsdf type=\"twosided\">" + model + R"(<float name="ior" value="1.75"/><float name="specular" value=".75"/>
+<rgb name="specular_color" value="2, 1, .5"/></bsdf></bsdf>)");
+  expect({{"KHR_materials_specular", {{"specularColorTexture", image}}},
+          {"KHR_materials_clearcoat",
+           {{"clearcoatFactor", 1},
+            {"clearcoatTexture", image},
+            {"clearcoatRoughnessFactor", 1},
+            {"clearcoatRoughnessTexture", image}}}},
+         "<bsdf type=\"twosided\">" + model + bitmap("specular_color", "picture.png", false) +
+             bitmap("clearcoat", "red.pgm", true) + bitmap("clearcoat_roughness", "green.pgm", true) +
+             "</bsdf></bsdf>");
+  expect({{"KHR_materials_transmission", {{"transmissionFactor", 1}, {"transmissionTexture", image}}}},
+         model + bitmap("transmission", "red.pgm", true) + "</bsdf>");
+  expect({{"KHR_materials_transmission", {{"transmissionFactor", 0.5}}},
+          {"KHR_materials_volume", {{"thicknessFactor", 1}}}},
+         model + R"(<float name="transmission" value=".5"/><boolean name="thin" value="false"/></bsdf>)");
 }
 
 /// A converted file is the same scene, with images in formats that Mitsuba reads.
