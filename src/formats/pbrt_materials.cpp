@@ -48,18 +48,53 @@ std::optional<Roughness> roughness(PbrtParameters& p, const PbrtNames& names) {
   return Roughness{*u, *v};
 }
 
-/// Index of refraction: a number, or one of pbrt's glasses at 589 nm.
+/// Index of refraction: a number, or one of pbrt's glasses (spectrum.cpp) at 589 nm; those of Schott's SF glasses are
+/// named 'glass-F…' in the program and 'glass-SF…' in its documentation.
 double index_of_refraction(PbrtParameters& p) {
   const PbrtParameter* eta = p.find("eta");
   if (!eta) return 1.5;
   if (eta->type == "float") return p.get_float("eta", 1.5);
   static const std::map<std::string, double> kGlasses = {
-      {"glass-BK7", 1.5168}, {"glass-BAF10", 1.67003}, {"glass-FK51A", 1.48656}, {"glass-LASF9", 1.85025},
-      {"glass-F5", 1.60342}, {"glass-SF5", 1.67271},   {"glass-SF10", 1.72828},  {"glass-SF11", 1.78472}};
+      {"glass-BK7", 1.5168},   {"glass-BAF10", 1.67003}, {"glass-FK51A", 1.48656}, {"glass-LASF9", 1.85025},
+      {"glass-F5", 1.67271},   {"glass-F10", 1.72828},   {"glass-F11", 1.78472},   {"glass-SF5", 1.67271},
+      {"glass-SF10", 1.72828}, {"glass-SF11", 1.78472}};
   const auto glass = eta->strings.size() == 1 ? kGlasses.find(eta->strings[0]) : kGlasses.end();
-  if (glass != kGlasses.end()) return glass->second;
-  p.error_at(*eta, "is not a supported index of refraction: expected a float, or a glass such as 'glass-BK7'");
-  return 1.5;
+  if (glass == kGlasses.end()) {
+    p.error_at(*eta, "is not a supported index of refraction: expected a float, or a glass such as 'glass-BK7'");
+    return 1.5;
+  }
+  p.warn(fmt::format("refracts all colours alike: {} has the index {}", glass->first, glass->second));
+  return glass->second;
+}
+
+/// pbrt's metals (spectrum.cpp) in linear Rec. 709 RGB, by the sums of spectrum_to_rgb() with SpectrumRole::kIndex.
+struct Metal {
+  const char* name;
+  Spectrum eta, k;
+};
+const Metal kMetals[] = {
+    {"Ag", {0.12849f, 0.12353f, 0.15088f}, {4.06518f, 3.28615f, 2.39157f}},
+    {"Al", {1.40751f, 0.92664f, 0.58402f}, {7.74094f, 6.60235f, 5.35991f}},
+    {"Au", {0.07996f, 0.4051f, 1.5607f}, {3.3905f, 2.50348f, 1.77087f}},
+    {"Cu", {0.10517f, 0.9779f, 1.20456f}, {3.27379f, 2.59248f, 2.36897f}},
+    {"CuZn", {0.41844f, 0.52008f, 1.12293f}, {3.66793f, 2.68058f, 1.77125f}},
+    {"MgO", {1.73384f, 1.74092f, 1.75339f}, {0, 0, 0}},
+    {"TiO2", {2.86065f, 2.95648f, 3.18524f}, {0.00009f, 0, 0.00057f}},
+};
+
+/// `name` of a conductor, 'eta' or 'k': a colour, a spectrum, or that of one of pbrt's metals, "metal-Au-eta"; by
+/// default that of copper. Nullopt after an error.
+std::optional<Value> metal_value(PbrtParameters& p, const std::string& name, const PbrtNames& names) {
+  const PbrtParameter* given = p.find(name);
+  if (given && (given->type != "spectrum" || given->strings.size() != 1)) return spectrum_value(p, name, names);
+  const std::string text = given ? given->strings[0] : "metal-Cu-" + name;
+  for (const Metal& metal : kMetals)
+    if (text == fmt::format("metal-{}-{}", metal.name, name)) return ColourValue{name == "k" ? metal.k : metal.eta};
+  std::string known;
+  for (const Metal& metal : kMetals)
+    known += fmt::format("{}'metal-{}-{}'", known.empty() ? "" : ", ", metal.name, name);
+  p.error_at(*given, fmt::format("names the spectrum '{}'; supported: {}", text, known));
+  return std::nullopt;
 }
 
 ObjectBuilder conductor(PbrtParameters& p, const PbrtNames& names) {
@@ -68,7 +103,7 @@ ObjectBuilder conductor(PbrtParameters& p, const PbrtNames& names) {
   auto model = make_object("bsdf", rough->smooth() ? "conductor" : "roughconductor", p.where());
   if (!rough->smooth()) rough->set(*model);
   if (p.has("reflectance")) {
-    const auto value = spectrum_value(p, "reflectance", names);
+    const auto value = reflectance_value(p, "reflectance", names);
     if (!value) return nullptr;
     const auto* colour = std::get_if<ColourValue>(&*value);
     if (!colour) {
@@ -85,24 +120,8 @@ ObjectBuilder conductor(PbrtParameters& p, const PbrtNames& names) {
     set_property(*model, "k", ColourValue{k});
     return two_sided(model);
   }
-  const auto metal = [&](const char* name, const std::string& end) -> std::string {
-    const PbrtParameter* spectrum = p.find(name);
-    if (!spectrum) return "Cu";
-    if (spectrum->strings.size() != 1) return "";
-    const std::string& text = spectrum->strings[0];
-    if (!text.starts_with("metal-") || !text.ends_with(end)) return "";
-    return text.substr(6, text.size() - 6 - end.size());
-  };
-  const std::string of_eta = metal("eta", "-eta"), of_k = metal("k", "-k");
-  if (!of_eta.empty() && of_eta == of_k) {
-    set_property(*model, "material", of_eta);
-    return two_sided(model);
-  }
-  const auto eta = spectrum_value(p, "eta", names), k = spectrum_value(p, "k", names);
-  if (!eta || !k) {
-    p.error("needs 'eta' and 'k' of one metal, or as two colours or spectra");
-    return nullptr;
-  }
+  const auto eta = metal_value(p, "eta", names), k = metal_value(p, "k", names);
+  if (!eta || !k) return nullptr;
   set_property(*model, "eta", *eta);
   set_property(*model, "k", *k);
   return two_sided(model);
@@ -127,7 +146,7 @@ ObjectBuilder dielectric(PbrtParameters& p, const PbrtNames& names, bool thin) {
 /// thickness of the clear layer.
 ObjectBuilder coated_diffuse(PbrtParameters& p, const PbrtNames& names) {
   const auto rough = roughness(p, names);
-  const auto reflectance = p.has("reflectance") ? spectrum_value(p, "reflectance", names) : Value(0.5);
+  const auto reflectance = p.has("reflectance") ? reflectance_value(p, "reflectance", names) : Value(0.5);
   if (!rough || !reflectance) return nullptr;
   if (const auto albedo = p.has("albedo") ? spectrum_value(p, "albedo", names) : std::nullopt; albedo)
     if (const auto* colour = std::get_if<ColourValue>(&*albedo); !colour || max_component(colour->rgb) > 0)
@@ -154,7 +173,7 @@ ObjectBuilder coated_diffuse(PbrtParameters& p, const PbrtNames& names) {
 ObjectBuilder diffuse(PbrtParameters& p, const PbrtNames& names) {
   auto model = make_object("bsdf", "diffuse", p.where());
   if (p.has("reflectance")) {
-    const auto reflectance = spectrum_value(p, "reflectance", names);
+    const auto reflectance = reflectance_value(p, "reflectance", names);
     if (!reflectance) return nullptr;
     set_property(*model, "reflectance", *reflectance);
   }
@@ -163,7 +182,8 @@ ObjectBuilder diffuse(PbrtParameters& p, const PbrtNames& names) {
 
 ObjectBuilder mix(PbrtParameters& p, const PbrtNames& names) {
   const PbrtParameter* materials = p.find("materials");
-  const auto amount = float_value(p, "amount", 0.5, names);
+  auto amount = float_value(p, "amount", 0.5, names);
+  if (double* number = amount ? std::get_if<double>(&*amount) : nullptr) *number = std::clamp(*number, 0.0, 1.0);
   if (!materials || materials->strings.size() != 2) {
     p.error("needs the names of two 'materials'");
     return nullptr;
@@ -186,8 +206,9 @@ ObjectBuilder mix(PbrtParameters& p, const PbrtNames& names) {
 /// The same model as ours. Without a colour, it is pbrt's brown hair.
 ObjectBuilder hair(PbrtParameters& p, const PbrtNames& names) {
   auto model = make_object("bsdf", "hair", p.where());
-  const double n = p.get_float("beta_n", 0.3);
-  set_property(*model, "longitudinal_roughness", p.get_float("beta_m", 0.3));
+  const auto beta = [&](const char* name) { return std::clamp(p.get_float(name, 0.3), 0.01, 1.0); };  // as pbrt
+  const double n = beta("beta_n");
+  set_property(*model, "longitudinal_roughness", beta("beta_m"));
   set_property(*model, "azimuthal_roughness", n);
   set_property(*model, "scale_tilt", p.get_float("alpha", 2));
   set_property(*model, "int_ior", p.get_float("eta", 1.55));
@@ -196,8 +217,8 @@ ObjectBuilder hair(PbrtParameters& p, const PbrtNames& names) {
     const auto absorption = spectrum_value(p, "sigma_a", names);
     if (!absorption) return nullptr;
     set_property(*model, "sigma_a", *absorption);
-  } else if (p.has("reflectance")) {
-    const auto value = spectrum_value(p, "reflectance", names);
+  } else if (const char* name = p.has("reflectance") ? "reflectance" : "color"; p.has(name)) {
+    const auto value = reflectance_value(p, name, names);
     const auto* colour = value ? std::get_if<ColourValue>(&*value) : nullptr;
     if (value && !colour) p.error("has a 'reflectance' that is not an 'rgb'; others are not supported");
     if (!colour) return nullptr;

@@ -10,6 +10,7 @@
 #include "formats/file_resolver.h"
 #include "formats/pbrt_objects.h"
 #include "formats/pbrt_parameters.h"
+#include "formats/pbrt_surfaces.h"
 #include "formats/scene_references.h"
 #include "formats/xml_values.h"
 
@@ -45,6 +46,7 @@ class Reader {
     if (!in_world_) diagnostics_.error(scene_->where, "the scene has no WorldBegin");
     if (!states_.empty()) diagnostics_.error(states_.back().where, "unterminated block");
     if (group_) diagnostics_.error(group_->where, "this object has no ObjectEnd");
+    if (view_.without_media) leave_media_out();
     for (const ObjectPtr& object : finish_pbrt_view(std::move(view_), scene_->where)) add(object);
     result.scene = scene_;
     result.hash = hash_bytes(digest_);
@@ -164,7 +166,10 @@ class Reader {
       p.error("stands behind WorldBegin");
     } else if (word == "Camera") {
       read_pbrt_camera(type, p, state_.placement.to_world, view_);
-      if (state_.outside && view_.sensor) set_property(*view_.sensor, "", state_.outside);
+      if (state_.outside && view_.sensor) {
+        set_property(*view_.sensor, "", state_.outside);
+        with_media_.push_back(view_.sensor);
+      }
       systems_["camera"] = state_.placement.to_world.inverse();
     } else {
       reader->second(type, p, view_);
@@ -228,14 +233,26 @@ class Reader {
       if (material) material->id = type;
       names_.materials[type] = material;
     } else if (word == "AreaLightSource") {
-      state_.area_light = make_pbrt_area_light(type, p);
+      state_.area_light = make_pbrt_area_light(type, p, view_.exposure());
     } else if (word == "LightSource") {
-      if (const ObjectPtr light = make_pbrt_light(type, p, state_.placement.to_world)) add(light);
+      if (const ObjectPtr light = make_pbrt_light(type, p, state_.placement.to_world, view_.exposure())) add(light);
     } else {
       read_shape(type, p);
     }
     p.report_unknown();
     return true;
+  }
+
+  /// As some integrators of pbrt do.
+  void leave_media_out() {
+    if (with_media_.empty()) return;
+    diagnostics_.warn(view_.integrator->where,
+                      "this integrator of pbrt leaves media out: so do we; 'volpath' has them");
+    for (const ObjectBuilder& object : with_media_)
+      std::erase_if(object->properties, [](const Property& p) {
+        const ObjectPtr* child = std::get_if<ObjectPtr>(&p.value);
+        return child && *child && (*child)->kind == "medium";
+      });
   }
 
   void read_texture(PbrtTokens& tokens) {
@@ -255,20 +272,15 @@ class Reader {
 
   void read_shape(const std::string& type, PbrtParameters& p) {
     const auto alpha = float_value(p, "alpha", 1, names_);
-    const ObjectBuilder shape = make_pbrt_shape(type, p, state_.placement);
+    const auto [shape, uv] = make_pbrt_shape(type, p, state_.placement, files_);
     if (!shape || !alpha) return;
     const bool opaque = std::holds_alternative<double>(*alpha) && std::get<double>(*alpha) >= 1;
     if (type == "curve" && opaque && !state_.area_light && curves_.is_of(state_, group_) &&
         join_pbrt_curves(*curves_.shape, *shape))
       return;
     curves_ = {type == "curve" && opaque ? shape : nullptr, state_.material, state_.inside, state_.outside, group_};
-    ObjectPtr material = state_.material;
-    if (!material && !state_.material_failed) material = default_material();
-    if (const auto* number = std::get_if<double>(&*alpha); material && (!number || *number < 1)) {
-      auto mask = make_object("bsdf", "mask", p.where(), {{"opacity", *alpha}, {"", material}});
-      material = mask;
-    }
-    if (material) set_property(*shape, "", material);
+    if (!state_.material_failed) set_property(*shape, "", surfaces_.make(state_.material, *alpha, uv, p));
+    if (state_.inside || state_.outside) with_media_.push_back(shape);
     if (state_.inside) set_property(*shape, "interior", state_.inside);
     if (state_.outside) set_property(*shape, "exterior", state_.outside);
     if (state_.area_light && group_)
@@ -281,14 +293,6 @@ class Reader {
     } else {
       add(shape);
     }
-  }
-
-  /// pbrt's default: diffuse with reflectance 0.5.
-  ObjectPtr default_material() {
-    if (default_material_) return default_material_;
-    auto sides = make_object("bsdf", "twosided", scene_->where,
-                             {{"", ObjectPtr(make_object("bsdf", "diffuse", scene_->where))}});
-    return default_material_ = sides;
   }
 
   void place_instance(const std::string& name) {
@@ -373,7 +377,8 @@ class Reader {
   std::vector<SavedState> states_;
   PbrtSystems systems_;
   std::map<std::string, ObjectBuilder> groups_;
-  ObjectPtr default_material_;
+  PbrtSurfaces surfaces_;
+  std::vector<ObjectBuilder> with_media_;
   SourceLocation where_;  // of the directive
   bool in_world_ = false;
   size_t n_text_bytes_ = 0, n_objects_ = 0;

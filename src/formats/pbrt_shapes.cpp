@@ -11,11 +11,17 @@
 namespace covary {
 namespace {
 
-ObjectBuilder shape(const std::string& type, PbrtParameters& p, const PbrtPlacement& placement,
+ObjectBuilder shape(const std::string& type, PbrtParameters& p, const PbrtPlacement& placement, bool flip,
                     const Transform& own = Transform()) {
   auto result = make_object("shape", type, p.where(), {{"to_world", placement.to_world * own}});
-  if (placement.reverse_orientation) set_property(*result, "flip_normals", true);
+  if (flip) set_property(*result, "flip_normals", true);
   return result;
+}
+
+/// pbrt's normals of spheres, disks and cylinders point to the other side under a mirroring transformation (shapes.h:
+/// flipNormal), those of meshes do not.
+bool flips_quadric(const PbrtPlacement& placement) {
+  return placement.reverse_orientation != placement.to_world.flips_handedness();
 }
 
 /// Indices in groups of `width`; empty after an error.
@@ -32,11 +38,18 @@ std::vector<double> read_indices(PbrtParameters& p, size_t n_vertices, size_t wi
   return indices;
 }
 
-ObjectBuilder mesh_shape(PbrtParameters& p, const PbrtPlacement& placement, EmbeddedMesh mesh, bool smooth) {
-  ObjectBuilder result = shape("ply", p, placement);
+/// Of a mesh without texture coordinates.
+PbrtUv triangle_uv(const PbrtPlacement& placement) {
+  const bool mirrored = placement.to_world.flips_handedness();
+  if (placement.reverse_orientation) return mirrored ? PbrtUv::kMirroredFlippedTriangles : PbrtUv::kFlippedTriangles;
+  return mirrored ? PbrtUv::kMirroredTriangles : PbrtUv::kTriangles;
+}
+
+PbrtShape mesh_shape(PbrtParameters& p, const PbrtPlacement& placement, const EmbeddedMesh& mesh) {
+  ObjectBuilder result = shape("ply", p, placement, placement.reverse_orientation);
   set_property(*result, std::string(kEmbeddedData), ply_text(mesh));
-  if (!smooth) set_property(*result, "face_normals", true);
-  return result;
+  if (mesh.normals.empty()) set_property(*result, "face_normals", true);
+  return {result, mesh.uvs.empty() ? triangle_uv(placement) : PbrtUv::kOwn};
 }
 
 /// Positions and per-vertex attributes.
@@ -58,24 +71,23 @@ std::optional<EmbeddedMesh> read_vertices(PbrtParameters& p) {
   return mesh;
 }
 
-ObjectBuilder triangle_mesh(PbrtParameters& p, const PbrtPlacement& placement) {
+PbrtShape triangle_mesh(PbrtParameters& p, const PbrtPlacement& placement) {
   std::optional<EmbeddedMesh> mesh = read_vertices(p);
   p.ignore({"S", "faceIndices"});
-  if (!mesh) return nullptr;
+  if (!mesh) return {};
   mesh->corners = read_indices(p, mesh->positions.size() / 3, 3);
-  if (mesh->corners.empty()) return nullptr;
-  const bool smooth = !mesh->normals.empty();
-  return mesh_shape(p, placement, std::move(*mesh), smooth);
+  if (mesh->corners.empty()) return {};
+  return mesh_shape(p, placement, *mesh);
 }
 
 /// Patches that are parallelograms: two triangles each, with (u, v) covering the unit square.
-ObjectBuilder bilinear_mesh(PbrtParameters& p, const PbrtPlacement& placement) {
+PbrtShape bilinear_mesh(PbrtParameters& p, const PbrtPlacement& placement) {
   const std::optional<EmbeddedMesh> given = read_vertices(p);
   p.ignore({"faceIndices"});
-  if (!given) return nullptr;
+  if (!given) return {};
   if (p.has("emissionfilename")) p.error("has an 'emissionfilename', which is not supported");
   const std::vector<double> indices = read_indices(p, given->positions.size() / 3, 4);
-  if (indices.empty()) return nullptr;
+  if (indices.empty()) return {};
   EmbeddedMesh mesh;
   for (size_t patch = 0; patch < indices.size(); patch += 4) {
     const auto first = static_cast<double>(mesh.positions.size() / 3);
@@ -88,7 +100,7 @@ ObjectBuilder bilinear_mesh(PbrtParameters& p, const PbrtPlacement& placement) {
     }
     if (off > 1e-4 * size) {
       p.error(fmt::format("is not a parallelogram in patch {}; only parallelograms are supported", patch / 4));
-      return nullptr;
+      return {};
     }
     for (size_t i = 0; i < 4; ++i) {
       const auto vertex = static_cast<size_t>(indices[patch + i]);
@@ -102,8 +114,7 @@ ObjectBuilder bilinear_mesh(PbrtParameters& p, const PbrtPlacement& placement) {
     }
     for (const int corner : {1, 2, 0, 1, 3, 2}) mesh.corners.push_back(first + corner);
   }
-  const bool smooth = !mesh.normals.empty();
-  return mesh_shape(p, placement, std::move(mesh), smooth);
+  return mesh_shape(p, placement, mesh);
 }
 
 /// Partial quadrics are not supported: the parameter must have the value of the whole.
@@ -113,55 +124,91 @@ void expect_whole(PbrtParameters& p, const char* name, double whole) {
     p.error(fmt::format("has {} {}; supported: whole ones, {}", name, value, whole));
 }
 
-ObjectBuilder sphere(PbrtParameters& p, const PbrtPlacement& placement) {
+/// Never mirrored: Mitsuba's normals depend on that, ours do not. Half turned and mirrored, it has pbrt's coordinates.
+PbrtShape sphere(PbrtParameters& p, const PbrtPlacement& placement) {
   const double radius = p.get_float("radius", 1);
   expect_whole(p, "zmin", -radius), expect_whole(p, "zmax", radius), expect_whole(p, "phimax", 360);
-  ObjectBuilder result = shape("sphere", p, placement);
+  const bool mirrored = placement.to_world.flips_handedness();
+  ObjectBuilder result =
+      shape("sphere", p, placement, flips_quadric(placement), mirrored ? Transform::scale({1, 1, -1}) : Transform());
   set_property(*result, "radius", radius);
-  return result;
+  return {result, mirrored ? PbrtUv::kOwn : PbrtUv::kSphere};
 }
 
-ObjectBuilder disk(PbrtParameters& p, const PbrtPlacement& placement) {
+PbrtShape disk(PbrtParameters& p, const PbrtPlacement& placement) {
   const auto radius = static_cast<float>(p.get_float("radius", 1)),
              height = static_cast<float>(p.get_float("height", 0));
   expect_whole(p, "innerradius", 0), expect_whole(p, "phimax", 360);
   if (!(radius > 0)) {
     p.error(fmt::format("has radius {}; it must be positive", radius));
-    return nullptr;
+    return {};
   }
-  return shape("disk", p, placement, Transform::translate({0, 0, height}) * Transform::scale({radius, radius, 1}));
+  return {shape("disk", p, placement, flips_quadric(placement),
+                Transform::translate({0, 0, height}) * Transform::scale({radius, radius, 1})),
+          PbrtUv::kDisk};
 }
 
 ObjectBuilder cylinder(PbrtParameters& p, const PbrtPlacement& placement) {
   const double radius = p.get_float("radius", 1), low = p.get_float("zmin", -1), high = p.get_float("zmax", 1);
   expect_whole(p, "phimax", 360);
-  ObjectBuilder result = shape("cylinder", p, placement);
+  ObjectBuilder result = shape("cylinder", p, placement, flips_quadric(placement));
   set_property(*result, "radius", radius);
   set_property(*result, "p0", Vec3{0, 0, static_cast<float>(std::min(low, high))});
   set_property(*result, "p1", Vec3{0, 0, static_cast<float>(std::max(low, high))});
   return result;
 }
 
+/// What the header of a PLY file says; unreadable files are reported when they are loaded.
+struct PlyHeader {
+  bool normals = false, uvs = false;
+};
+PlyHeader ply_header(const std::string& path) {
+  constexpr size_t kLongest = 1 << 16;
+  PlyHeader header;
+  try {
+    const FileView file(path);
+    std::string_view text = file.text().substr(0, kLongest);
+    text = text.substr(0, text.find("end_header"));
+    while (!text.empty()) {
+      const std::string_view line = text.substr(0, text.find_first_of("\r\n"));
+      text.remove_prefix(std::min(line.size() + 1, text.size()));
+      if (!line.starts_with("property ")) continue;
+      const std::string_view name = line.substr(line.find_last_of(' ') + 1);
+      header.normals |= name == "nx";
+      header.uvs |= name == "u" || name == "s" || name == "texture_u" || name == "texture_s";
+    }
+  } catch (const Error&) {
+  }
+  return header;
+}
+
+PbrtShape ply_mesh(PbrtParameters& p, const PbrtPlacement& placement, FileResolver& files) {
+  if (p.has("displacement")) p.error("has a 'displacement', which is not supported");
+  p.ignore({"displacement", "edgelength"});
+  const std::string name = p.get_string("filename", "");
+  ObjectBuilder result = shape("ply", p, placement, placement.reverse_orientation);
+  set_property(*result, "filename", name);
+  Diagnostics missing;  // reported when the file is loaded
+  const PlyHeader header = ply_header(files.resolve(name, p.where(), missing));
+  if (!header.normals) set_property(*result, "face_normals", true);
+  return {result, header.uvs ? PbrtUv::kOwn : triangle_uv(placement)};
+}
+
 }  // namespace
 
-ObjectBuilder make_pbrt_shape(const std::string& type, PbrtParameters& p, const PbrtPlacement& placement) {
+PbrtShape make_pbrt_shape(const std::string& type, PbrtParameters& p, const PbrtPlacement& placement,
+                          FileResolver& files) {
   if (type == "sphere") return sphere(p, placement);
   if (type == "disk") return disk(p, placement);
-  if (type == "cylinder") return cylinder(p, placement);
+  if (type == "cylinder") return {cylinder(p, placement)};
   if (type == "trianglemesh") return triangle_mesh(p, placement);
   if (type == "bilinearmesh") return bilinear_mesh(p, placement);
-  if (type == "curve") return make_pbrt_curve(p, placement);
-  if (type == "plymesh") {
-    if (p.has("displacement")) p.error("has a 'displacement', which is not supported");
-    p.ignore({"displacement", "edgelength"});
-    ObjectBuilder result = shape("ply", p, placement);
-    set_property(*result, "filename", p.get_string("filename", ""));
-    return result;
-  }
+  if (type == "curve") return {make_pbrt_curve(p, placement), PbrtUv::kCurve};
+  if (type == "plymesh") return ply_mesh(p, placement, files);
   p.error(
       "is not supported; supported: shapes 'bilinearmesh', 'curve', 'cylinder', 'disk', 'plymesh', 'sphere' and "
       "'trianglemesh'");
-  return nullptr;
+  return {};
 }
 
 }  // namespace covary

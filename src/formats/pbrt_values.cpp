@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 
 #include "formats/pbrt_objects.h"
 #include "formats/xml_values.h"
@@ -42,6 +43,23 @@ std::optional<ColourValue> rgb(PbrtParameters& p, const PbrtParameter& parameter
   return std::nullopt;
 }
 
+bool of_numbers(const PbrtParameters& p) { return p.what().starts_with("Texture \"float\""); }
+
+/// The same object, if both are textures; other values are not compared.
+bool same(const Value& a, const Value& b) {
+  const ObjectPtr *first = std::get_if<ObjectPtr>(&a), *second = std::get_if<ObjectPtr>(&b);
+  return !first || !second || *first == *second;
+}
+
+/// False, with an error as in pbrt, for a colour that no surface can have.
+bool check_reflectance(PbrtParameters& p, const std::string& name, const Value& value) {
+  const auto* colour = std::get_if<ColourValue>(&value);
+  if (!colour || max_component(colour->rgb) <= 1) return true;
+  p.error_at(*p.find(name),
+             fmt::format("is the colour {}, {}, {}; expected at most 1", colour->rgb.r, colour->rgb.g, colour->rgb.b));
+  return false;
+}
+
 /// pbrt's mapping of (u, v), followed by `more`.
 Transform texture_mapping(PbrtParameters& p, const Transform& more) {
   if (const std::string mapping = p.get_string("mapping", "uv"); mapping != "uv")
@@ -57,8 +75,22 @@ Transform texture_mapping(PbrtParameters& p, const Transform& more) {
   return more * Transform::translate(shift) * Transform::scale(scale);
 }
 
-ObjectBuilder image_texture(PbrtParameters& p) {
-  auto bitmap = make_object("texture", "bitmap", p.where(), {{"filename", p.get_string("filename", "")}});
+/// A texture times a number; values above `maximum`, if it is given, are clamped.
+ObjectBuilder scaled(const SourceLocation& where, double scale, const ObjectPtr& texture,
+                     std::optional<double> maximum = std::nullopt) {
+  auto result = make_object("texture", "scale", where, {{"scale", scale}, {"", texture}});
+  if (maximum) set_property(*result, "maximum", *maximum);
+  return result;
+}
+
+bool has_extension(std::string name, std::initializer_list<const char*> extensions) {
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
+  return std::ranges::any_of(extensions, [&](const char* extension) { return name.ends_with(extension); });
+}
+
+ObjectBuilder image_texture(PbrtParameters& p, PbrtNames& names) {
+  const std::string filename = p.get_string("filename", "");
+  auto bitmap = make_object("texture", "bitmap", p.where(), {{"filename", filename}});
   // pbrt's v = 0 is the bottom of the image.
   const Transform flip = Transform::translate({0, 1, 0}) * Transform::scale({1, -1, 1});
   set_property(*bitmap, "to_uv", texture_mapping(p, flip));
@@ -72,49 +104,89 @@ ObjectBuilder image_texture(PbrtParameters& p) {
   const std::string encoding = p.get_string("encoding", "sRGB");
   if (encoding != "sRGB" && encoding != "linear")
     p.error(fmt::format("has encoding '{}'; supported: 'sRGB' and 'linear'", encoding));
-  set_property(*bitmap, "raw", encoding == "linear");
+  // pbrt reads the encoding of PNG files alone: other integers are sRGB, floats linear (image.cpp: Image::Read).
+  set_property(*bitmap, "raw", encoding == "linear" && has_extension(filename, {".png"}));
+  if (of_numbers(p)) set_property(*bitmap, "grey", std::string("alpha_or_mean"));
   if (p.get_bool("invert", false)) p.error("is inverted, which is not supported");
   const double scale = p.get_float("scale", 1);
-  if (scale == 1) return bitmap;
-  return make_object("texture", "scale", p.where(), {{"scale", scale}, {"", ObjectPtr(bitmap)}});
+  const ObjectBuilder texture = scale == 1 ? bitmap : scaled(p.where(), scale, bitmap);
+  if (scale > 1 || has_extension(filename, {".exr", ".pfm", ".hdr"}))  // pbrt clamps images used as reflectances
+    names.reflectances[texture] = scaled(p.where(), scale, bitmap, 1.0);
+  return texture;
 }
 
 /// A texture's input: a number, a colour or another texture.
-std::optional<Value> either(PbrtParameters& p, const std::string& name, double fallback, bool of_numbers,
-                            const PbrtNames& names) {
-  if (of_numbers) return float_value(p, name, fallback, names);
+std::optional<Value> either(PbrtParameters& p, const std::string& name, double fallback, const PbrtNames& names) {
+  if (of_numbers(p)) return float_value(p, name, fallback, names);
   if (!p.has(name)) return fallback;
-  return spectrum_value(p, name, names);
+  std::optional<Value> value = spectrum_value(p, name, names);
+  if (value && !check_reflectance(p, name, *value)) value.reset();
+  return value;
 }
 
-ObjectBuilder checkerboard(PbrtParameters& p, bool of_numbers, const PbrtNames& names) {
+/// The texture or colour that pbrt looks up for a reflectance.
+Value as_reflectance(const Value& value, const PbrtNames& names) {
+  const ObjectPtr* texture = std::get_if<ObjectPtr>(&value);
+  const auto other = texture ? names.reflectances.find(*texture) : names.reflectances.end();
+  return other == names.reflectances.end() ? value : Value(other->second);
+}
+
+ObjectBuilder checkerboard(PbrtParameters& p, PbrtNames& names) {
   if (p.get_integer("dimension", 2) != 2) p.error("has three dimensions; supported: two");
   auto board = make_object("texture", "checkerboard", p.where());
   // pbrt's squares have side 1, ours 1/2.
   set_property(*board, "to_uv", texture_mapping(p, Transform::scale({0.5f, 0.5f, 1})));
-  const auto first = either(p, "tex1", 1, of_numbers, names), second = either(p, "tex2", 0, of_numbers, names);
+  const auto first = either(p, "tex1", 1, names), second = either(p, "tex2", 0, names);
   if (!first || !second) return nullptr;
+  const Value reflected[] = {as_reflectance(*first, names), as_reflectance(*second, names)};
+  if (!same(reflected[0], *first) || !same(reflected[1], *second)) {
+    auto other = std::make_shared<ObjectDescription>(*board);
+    set_property(*other, "color0", reflected[0]);
+    set_property(*other, "color1", reflected[1]);
+    names.reflectances[board] = other;
+  }
   set_property(*board, "color0", *first);
   set_property(*board, "color1", *second);
   return board;
 }
 
-ObjectBuilder scaled_texture(PbrtParameters& p, bool of_numbers, const PbrtNames& names) {
-  const auto texture = either(p, "tex", 1, of_numbers, names);
+ObjectBuilder scaled_texture(PbrtParameters& p, PbrtNames& names) {
+  const auto texture = either(p, "tex", 1, names);
   const auto factor = float_value(p, "scale", 1, names);
   if (!texture || !factor) return nullptr;
   if (!std::holds_alternative<double>(*factor)) {
     p.error("scales by a texture; supported: a number");
     return nullptr;
   }
-  auto scaled = make_object("texture", "scale", p.where(), {{"scale", *factor}});
-  if (std::holds_alternative<ObjectPtr>(*texture)) {
-    set_property(*scaled, "", *texture);
-  } else {
-    auto constant = make_object("texture", "uniform", p.where(), {{"value", *texture}});
-    set_property(*scaled, "", ObjectPtr(constant));
-  }
-  return scaled;
+  const double scale = std::get<double>(*factor);
+  if (!std::holds_alternative<ObjectPtr>(*texture))
+    return scaled(p.where(), scale, make_object("texture", "uniform", p.where(), {{"value", *texture}}));
+  ObjectBuilder result = scaled(p.where(), scale, std::get<ObjectPtr>(*texture));
+  if (const Value reflected = as_reflectance(*texture, names); !same(reflected, *texture))
+    names.reflectances[result] = scaled(p.where(), scale, std::get<ObjectPtr>(reflected));
+  return result;
+}
+
+/// Whether a texture may give a reflectance above 1: by a factor, or by a spectrum.
+bool may_exceed_1(const ObjectPtr& texture) {
+  const auto number = [](const Property& p) {
+    const double* value = std::get_if<double>(&p.value);
+    return value ? *value : 0;
+  };
+  const auto exceeds = [&](const ObjectDescription& object) {
+    const auto has = [&](const char* name, auto test) {
+      return std::ranges::any_of(object.properties, [&](const Property& p) { return p.name == name && test(p); });
+    };
+    return object.type == "scale" && has("scale", [&](const Property& p) { return number(p) > 1; }) &&
+           !has("maximum", [](const Property&) { return true; });
+  };
+  bool found = exceeds(*texture);
+  visit_properties(*texture, [&](const ObjectDescription&, const Property& property) {
+    if (const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value); child && *child) found |= exceeds(**child);
+    if (const auto* spectrum = std::get_if<SampledSpectrum>(&property.value))
+      found |= std::ranges::any_of(spectrum->samples, [](const auto& sample) { return sample.second > 1; });
+  });
+  return found;
 }
 
 }  // namespace
@@ -149,6 +221,14 @@ std::optional<Value> spectrum_value(PbrtParameters& p, const std::string& name, 
   return std::nullopt;
 }
 
+std::optional<Value> reflectance_value(PbrtParameters& p, const std::string& name, const PbrtNames& names) {
+  const std::optional<Value> value = spectrum_value(p, name, names);
+  if (!value || !check_reflectance(p, name, *value)) return std::nullopt;
+  const Value reflected = as_reflectance(*value, names);
+  const ObjectPtr* texture = std::get_if<ObjectPtr>(&reflected);
+  return texture && may_exceed_1(*texture) ? Value(scaled(p.where(), 1, *texture, 1.0)) : reflected;
+}
+
 Spectrum light_colour(PbrtParameters& p, const std::string& name) {
   const PbrtParameter* parameter = p.find(name);
   if (!parameter) return Spectrum(1);
@@ -173,14 +253,13 @@ Spectrum light_colour(PbrtParameters& p, const std::string& name) {
   return Spectrum(1);
 }
 
-ObjectBuilder make_pbrt_texture(const std::string& type, PbrtParameters& p, const PbrtNames& names) {
-  const bool of_numbers = p.what().starts_with("Texture \"float\"");
-  if (type == "imagemap") return image_texture(p);
-  if (type == "checkerboard") return checkerboard(p, of_numbers, names);
-  if (type == "scale") return scaled_texture(p, of_numbers, names);
+ObjectBuilder make_pbrt_texture(const std::string& type, PbrtParameters& p, PbrtNames& names) {
+  if (type == "imagemap") return image_texture(p, names);
+  if (type == "checkerboard") return checkerboard(p, names);
+  if (type == "scale") return scaled_texture(p, names);
   if (type == "constant") {
     auto constant = make_object("texture", "uniform", p.where());
-    const auto value = either(p, "value", 1, of_numbers, names);
+    const auto value = either(p, "value", 1, names);
     if (!value) return nullptr;
     set_property(*constant, "value", *value);
     return constant;

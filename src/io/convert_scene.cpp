@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <set>
 
+#include "core/srgb.h"
 #include "emitters/equal_area_image.h"
 #include "formats/file_resolver.h"
 #include "formats/object_builder.h"
@@ -40,8 +42,9 @@ void warn_of_own_plugins(const ObjectDescription& scene, std::vector<std::string
     const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
     if (!child || !*child) return;
     const ObjectDescription& object = **child;
-    const bool own =
-        (object.kind == "texture" && object.type == "scale") || (object.kind == "integrator" && object.type == "bdpt");
+    const bool own = (object.kind == "texture" && object.type == "scale") ||
+                     (object.kind == "integrator" && object.type == "bdpt") ||
+                     (object.kind == "bsdf" && object.type == "metallicroughness");
     if (own && told.insert(object.type).second)
       warnings.push_back(fmt::format("{}: becomes the {} '{}', which Mitsuba 3 does not have", object.where.text(),
                                      object.kind, object.type));
@@ -93,14 +96,61 @@ ObjectPtr in_latitude_longitude(const ObjectDescription& emitter, const FindFile
   return changed;
 }
 
+/// Images whose one channel is not what Mitsuba takes become grey images.
+class GreyImages {
+ public:
+  explicit GreyImages(const FindFile& find_file) : find_file_(find_file) {}
+
+  ObjectPtr of(const ObjectPtr& object) {
+    if (const auto known = done_.find(object); known != done_.end()) return known->second;
+    std::shared_ptr<ObjectDescription> changed;  // copies only what changes: meshes may be large
+    const auto copy = [&]() -> ObjectDescription& {
+      if (!changed) changed = std::make_shared<ObjectDescription>(*object);
+      return *changed;
+    };
+    for (size_t i = 0; i < object->properties.size(); ++i)
+      if (const ObjectPtr* child = std::get_if<ObjectPtr>(&object->properties[i].value); child && *child)
+        if (const ObjectPtr other = of(*child); other != *child) copy().properties[i].value = other;
+    if (object->kind == "texture" && object->type == "bitmap" &&
+        std::any_of(object->properties.begin(), object->properties.end(),
+                    [](const Property& p) { return p.name == "grey"; }))
+      make_grey(copy());
+    return done_[object] = changed ? ObjectPtr(changed) : object;
+  }
+
+ private:
+  void make_grey(ObjectDescription& bitmap) {
+    std::erase_if(bitmap.properties, [](const Property& p) { return p.name == "grey"; });
+    const auto file = std::find_if(bitmap.properties.begin(), bitmap.properties.end(),
+                                   [](const Property& p) { return p.name == "filename"; });
+    if (file == bitmap.properties.end()) return;
+    const std::string path = find_file_(std::get<std::string>(file->value), file->where);
+    const bool raw = std::any_of(bitmap.properties.begin(), bitmap.properties.end(), [](const Property& p) {
+      const bool* value = std::get_if<bool>(&p.value);
+      return p.name == "raw" && value && *value;
+    });
+    if (read_texels(path).channels == 1) return;  // Mitsuba takes the same
+    TexelImage image = read_alpha_or_mean(path, raw);
+    if (image.srgb && !raw)
+      for (float& value : image.floats) value = srgb_to_linear(value);
+    file->name = kEmbeddedData;
+    file->value = pfm_text(image);
+  }
+
+  const FindFile& find_file_;
+  std::map<ObjectPtr, ObjectPtr> done_;
+};
+
 /// The scene with environments in Mitsuba's mapping and, if it has media, Mitsuba's volumetric path tracer.
 std::shared_ptr<const ObjectDescription> for_mitsuba(const ObjectDescription& scene, const FindFile& find_file,
                                                      std::vector<std::string>& warnings) {
   auto changed = std::make_shared<ObjectDescription>(scene);
   const bool media = has_media(scene);
+  GreyImages images(find_file);
   for (Property& property : changed->properties) {
     ObjectPtr* object = std::get_if<ObjectPtr>(&property.value);
     if (!object || !*object) continue;
+    *object = images.of(*object);
     if (media && (*object)->kind == "integrator" && (*object)->type == "path") {
       auto integrator = std::make_shared<ObjectDescription>(**object);
       integrator->type = "volpath";

@@ -186,7 +186,8 @@ WorldBegin
 <sampler type="independent"><integer name="sample_count" value="16"/></sampler>
 <film type="hdrfilm"><integer name="width" value="40"/><integer name="height" value="50"/>
 <rfilter type="tent"/></film></sensor>
-<bsdf type="twosided" id="copper"><bsdf type="roughconductor"><string name="material" value="Cu"/>
+<bsdf type="twosided" id="copper"><bsdf type="roughconductor"><rgb name="eta" value="0.10517, 0.9779, 1.20456"/>
+<rgb name="k" value="3.27379, 2.59248, 2.36897"/>
 <string name="distribution" value="ggx"/><float name="alpha" value=".5"/></bsdf></bsdf>
 <shape type="ply"><string name="filename" value="t.ply"/><bsdf type="blendbsdf"><float name="weight" value=".3"/>
 <bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value=".6, .3, .1"/></bsdf></bsdf>
@@ -409,7 +410,7 @@ TEST_F(Pbrt, MistakesOfTheTextEndTheReading) {
 }
 
 TEST_F(Pbrt, WhatLooksDifferentIsAWarning) {
-  const LoadedScene a = pbrt(R"(Integrator "sppm" PixelFilter "mitchell"
+  const LoadedScene a = pbrt(R"(Integrator "mlt" PixelFilter "mitchell"
 WorldBegin
 LightSource "spot"
 Material "coateddiffuse" "float roughness" 0
@@ -419,7 +420,7 @@ ObjectInstance "lamp"
   std::string all;
   for (const std::string& warning : a.warnings) all += warning + "\n";
   for (const char* message :
-       {"Integrator \"sppm\" is read as 'path'", "PixelFilter \"mitchell\" is read as 'gaussian'",
+       {"Integrator \"mlt\" is read as 'path'", "PixelFilter \"mitchell\" is read as 'gaussian'",
         "LightSource \"spot\" has a smooth edge", "Material \"coateddiffuse\" is read as 'plastic'",
         "Shape \"sphere\" emits no light, because it is part of an object"})
     EXPECT_TRUE(contains(all, message));
