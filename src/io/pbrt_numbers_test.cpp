@@ -384,8 +384,8 @@ Shape "bilinearmesh" "point3 P" [ -1 -1 3  1 -1 3  -1 1 3  1 1 3 ]
   EXPECT_NEAR(value("grey.ppm", "\"string encoding\" \"linear\""), srgb_to_linear(0.4f), 1e-5f);
 }
 
-/// mipmap.cpp: as a number, a colour is the mean of its channels. Mitsuba takes the luminance, so that a converted scene
-/// has the means as an image.
+/// mipmap.cpp: as a number, a colour is the mean of its channels. Mitsuba takes the luminance, so that a converted
+/// scene has the means as an image.
 TEST_F(PbrtNumbers, ImagesAreTheirMeanAsNumbers) {
   const std::vector<unsigned char> bytes = encode_png(1, 1, std::vector<uint8_t>{255, 102, 0});
   write("colour.png", {bytes.begin(), bytes.end()});
