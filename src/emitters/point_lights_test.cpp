@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "emitters/registry.h"
@@ -130,6 +131,30 @@ TEST_P(Spot, IntensityIsThatOfEmittedRays) {
 }
 
 INSTANTIATE_TEST_SUITE_P(References, Spot, testing::Values(0, 1, 2));
+
+/// The edges of KHR_lights_punctual ("angular attenuation") and of pbrt-v4 (lights.cpp, SpotLight::I, SmoothStep).
+TEST(SpotLight, EdgesAreThoseOfOtherPrograms) {
+  const double outer = 40 * M_PI / 180, inner = 25 * M_PI / 180, c = std::cos(outer), b = std::cos(inner);
+  const std::pair<const char*, std::function<double(double)>> edges[] = {
+      {"squared", [](double t) { return t * t; }}, {"smooth", [](double t) { return t * t * (3 - 2 * t); }}};
+  for (const auto& [name, edge] : edges) {
+    const auto light =
+        make("spot", {{"cutoff_angle", 40.0}, {"beam_width", 25.0}, {"intensity", 3.0}, {"falloff", std::string(name)}})
+            .object;
+    double power = 0;
+    constexpr int kSteps = 100000;
+    for (int i = 0; i < kSteps; ++i) {
+      const double z = 1 - (i + 0.5) * (1 - c) / kSteps;
+      const double expected = 3 * edge(std::clamp((z - c) / (b - c), 0.0, 1.0));
+      power += 2 * M_PI * expected * (1 - c) / kSteps;
+      if (i % 1000 != 0) continue;
+      const Vec3 from{0, static_cast<float>(2 * std::sqrt(1 - z * z)), static_cast<float>(2 * z)};
+      EXPECT_NEAR(light->sample_towards(from, {}, 0).radiance.g * 4, expected, 1e-4) << name << " " << z;
+    }
+    EXPECT_NEAR(light->power().g, power, 1e-4 * power) << name;
+  }
+  EXPECT_NE(make("spot", {{"falloff", std::string("round")}}).errors, "");
+}
 
 TEST(SpotLight, ReportsWrongAngles) {
   EXPECT_EQ(make("spot", {{"cutoff_angle", 20.0}, {"beam_width", 30.0}}).errors,

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// `spot`: a point light restricted to a cone around the z axis. The intensity is constant up to beam_width and falls
-// linearly in the angle to zero at cutoff_angle.
+// `spot`: a point light restricted to a cone around the z axis. The intensity is constant up to beam_width and falls to
+// zero at cutoff_angle: with the fraction t of the way back to the beam, as t in the angle (Mitsuba), as t^2 in the
+// cosine (glTF: KHR_lights_punctual), or as 3 t^2 - 2 t^3 in the cosine (pbrt).
 //
 // | parameter    | type      | default          | meaning                                                       |
 // |--------------|-----------|------------------|---------------------------------------------------------------|
 // | intensity    | colour    | 1                | power per unit solid angle at the centre                      |
 // | cutoff_angle | float     | 20               | half angle of the cone in degrees, in (0, 180)                |
 // | beam_width   | float     | 0.75 * cutoff    | half angle of full intensity in degrees, up to cutoff_angle   |
+// | falloff      | string    | linear           | or `squared` or `smooth`, see above                           |
 // | texture      | texture   | none             | projected factor; its unit square spans the cone (cutoff < 90) |
 // | to_world     | transform | identity         | the light stands at the image of the origin                   |
 #include "core/warp.h"
@@ -30,6 +32,8 @@ class SpotLight final : public Emitter {
       cutoff = 20;
     }
     if (beam_width > cutoff) p.error_at("beam_width", "must not exceed cutoff_angle");
+    const std::string falloff = p.get_choice("falloff", "linear", {"linear", "squared", "smooth"});
+    falloff_ = falloff == "squared" ? Falloff::kSquared : falloff == "smooth" ? Falloff::kSmooth : Falloff::kLinear;
     cutoff_ = cutoff * (kPi / 180), beam_width_ = std::min(beam_width, cutoff) * (kPi / 180);
     cos_cutoff_ = std::cos(cutoff_), cos_beam_ = std::cos(beam_width_);
     one_minus_cos_cutoff_ = 2 * sqr(std::sin(cutoff_ / 2));
@@ -57,6 +61,10 @@ class SpotLight final : public Emitter {
   Spectrum power() const override {
     const float c = cutoff_, b = beam_width_;
     if (!texture_) {
+      if (falloff_ != Falloff::kLinear) {  // the means of t^2 and of 3 t^2 - 2 t^3 are 1 / 3 and 1 / 2
+        const float edge = (cos_beam_ - cos_cutoff_) * (falloff_ == Falloff::kSquared ? 1.0f / 3 : 0.5f);
+        return intensity_ * (kTwoPi * (1 - cos_beam_ + edge));
+      }
       // 2 pi times the integral of sin(t) up to b and of sin(t) (c - t) / (c - b) from b to c.
       const float mean_cosine = c - b > 1e-4f ? (std::sin(c) - std::sin(b)) / (c - b) : std::cos(c);
       return intensity_ * (kTwoPi * (1 - mean_cosine));
@@ -71,12 +79,18 @@ class SpotLight final : public Emitter {
   bool knows_power() const override { return !texture_ || texture_->is_constant(); }
 
  private:
+  enum class Falloff : uint8_t { kLinear, kSquared, kSmooth };
+
+  /// Between beam and cutoff, for a direction with the cosine `z`.
+  float edge(float z) const {
+    if (falloff_ == Falloff::kLinear) return std::max((cutoff_ - std::acos(z)) / (cutoff_ - beam_width_), 0.0f);
+    const float t = (z - cos_cutoff_) / (cos_beam_ - cos_cutoff_);
+    return falloff_ == Falloff::kSquared ? t * t : t * t * (3 - 2 * t);
+  }
   /// Power per unit solid angle in the unit direction `local` away from the light.
   Spectrum intensity(const Vec3& local) const {
     if (!(local.z > cos_cutoff_)) return Spectrum();
-    float falloff = 1;
-    if (local.z < cos_beam_) falloff = (cutoff_ - std::acos(local.z)) / (cutoff_ - beam_width_);
-    const Spectrum value = intensity_ * std::max(falloff, 0.0f);
+    const Spectrum value = intensity_ * (local.z < cos_beam_ ? edge(local.z) : 1);
     if (!texture_) return value;
     SurfaceHit hit;
     const float scale = 0.5f / (local.z * std::tan(cutoff_));
@@ -86,7 +100,8 @@ class SpotLight final : public Emitter {
 
   PointFrame frame_;
   Spectrum intensity_;
-  TexturePtr texture_;         // may be null
+  TexturePtr texture_;  // may be null
+  Falloff falloff_;
   float cutoff_, beam_width_;  // radians, 0 <= beam_width <= cutoff
   float cos_cutoff_, cos_beam_, one_minus_cos_cutoff_;
 };

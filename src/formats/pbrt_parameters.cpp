@@ -116,11 +116,12 @@ PbrtParameters::PbrtParameters(PbrtTokens& tokens, std::string what, const Sourc
     const PbrtToken token = tokens.next();
     PbrtParameter parameter;
     parameter.where = tokens.where(token);
-    const size_t type_end = token.text.find_first_of(" \t");
+    const size_t type = std::min(token.text.find_first_not_of(" \t"), token.text.size());
+    const size_t type_end = token.text.find_first_of(" \t", type);
     const size_t name = token.text.find_first_not_of(" \t", type_end);
     if (type_end == std::string::npos || name == std::string::npos)
       tokens.stop(token, fmt::format("found '{}'; expected a type and a name, such as \"float radius\"", token.text));
-    parameter.type = token.text.substr(0, type_end);
+    parameter.type = token.text.substr(type, type_end - type);
     parameter.name = token.text.substr(name, token.text.find_last_not_of(" \t") + 1 - name);
     if (std::ranges::find(kTypes, parameter.type) == kTypes.end())
       tokens.stop(token, fmt::format("unknown type '{}' of parameter '{}'{}{}", parameter.type, parameter.name,

@@ -41,13 +41,13 @@ void refuse(PbrtParameters& p, std::initializer_list<const char*> names) {
 ObjectPtr spot(PbrtParameters& p, const Transform& to_world, double exposure) {
   const double cone = p.get_float("coneangle", 30), edge = p.get_float("conedeltaangle", 5);
   const Aim aim = read_aim(p);
-  // With pbrt's falloff, smooth in the cosine.
   const double end = std::cos(cone * M_PI / 180), start = std::cos((cone - edge) * M_PI / 180);
   exposure *= target(p, "power", 2 * M_PI * (1 - start + (start - end) / 2));
   auto light = make_object("emitter", "spot", p.where(),
                            {{"intensity", scaled_colour(p, "I", exposure)},
                             {"cutoff_angle", cone},
-                            {"beam_width", std::max(cone - edge, 0.0)}});
+                            {"beam_width", std::max(cone - edge, 0.0)},
+                            {"falloff", std::string("smooth")}});
   const Vec3 z = aim.to - aim.from, up = std::abs(z.x) > std::abs(z.y) ? Vec3{0, 1, 0} : Vec3{1, 0, 0};
   try {
     set_property(*light, "to_world", to_world * Transform::look_at(aim.from, aim.to, up));
@@ -55,7 +55,6 @@ ObjectPtr spot(PbrtParameters& p, const Transform& to_world, double exposure) {
     p.error("has the same point as origin and target");
     return nullptr;
   }
-  if (edge > 0) p.warn("has a smooth edge, which is linear here");
   return light;
 }
 

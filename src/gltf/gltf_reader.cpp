@@ -291,6 +291,7 @@ class Reader {
       set_property(*light, "intensity", ColourValue{colour});
       set_property(*light, "cutoff_angle", given.spot.outerConeAngle * kDegrees);
       set_property(*light, "beam_width", given.spot.innerConeAngle * kDegrees);
+      set_property(*light, "falloff", std::string("squared"));
       set_property(*light, "to_world", to_world * about_face());
     } else {
       file_.error(fmt::format("light '{}' is of the type '{}', which there is not", given.name, given.type));

@@ -35,7 +35,13 @@ std::string relative_name(const fs::path& file, const fs::path& folder) {
   return failed || relative.empty() ? fs::absolute(file).string() : relative.string();
 }
 
-/// Warns about plugins that Mitsuba 3 does not have.
+bool has_own_edge(const ObjectDescription& object) {
+  return object.kind == "emitter" && object.type == "spot" &&
+         std::any_of(object.properties.begin(), object.properties.end(),
+                     [](const Property& p) { return p.name == "falloff"; });
+}
+
+/// Warns about plugins and parameters that Mitsuba 3 does not have.
 void warn_of_own_plugins(const ObjectDescription& scene, std::vector<std::string>& warnings) {
   std::set<std::string> told;
   visit_properties(scene, [&](const ObjectDescription&, const Property& property) {
@@ -45,6 +51,8 @@ void warn_of_own_plugins(const ObjectDescription& scene, std::vector<std::string
     const bool own = (object.kind == "texture" && object.type == "scale") ||
                      (object.kind == "integrator" && object.type == "bdpt") ||
                      (object.kind == "bsdf" && object.type == "metallicroughness");
+    if (has_own_edge(object) && told.insert("falloff").second)
+      warnings.push_back(object.where.text() + ": the spot has the parameter 'falloff', which Mitsuba 3 does not have");
     if (own && told.insert(object.type).second)
       warnings.push_back(fmt::format("{}: becomes the {} '{}', which Mitsuba 3 does not have", object.where.text(),
                                      object.kind, object.type));

@@ -179,6 +179,7 @@ TEST_F(GltfReader, IsTheSceneByHand) {
 <emitter type="point"><point name="position" x="0" y="2" z="1"/><rgb name="intensity" value="20, 16, 12"/></emitter>
 <emitter type="directional"><vector name="direction" x="0" y="-1" z="-1"/><rgb name="irradiance" value="3"/></emitter>
 <emitter type="spot"><rgb name="intensity" value="30"/><float name="cutoff_angle" value="28.6478897565"/>
+<string name="falloff" value="squared"/>
 <float name="beam_width" value="11.4591559026"/><transform name="to_world">
 <lookat origin="0, 2, 1" target="0, 1, 0" up="0, 1, 0"/></transform></emitter>)");
   test_support::expect_same_scene(a, b, 100);
@@ -307,6 +308,9 @@ TEST_F(GltfReader, CanBeConverted) {
     write(part.path, std::string(part.bytes));
     ++kinds[std::filesystem::path(part.path).extension().string()];
   }
+  ASSERT_FALSE(converted.warnings.empty());
+  EXPECT_TRUE(
+      contains(converted.warnings.back(), "becomes the bsdf 'metallicroughness', which Mitsuba 3 does not have"));
   // The original image, shared by colours and normals; its green and its blue channel; the mesh.
   EXPECT_EQ(kinds, (std::map<std::string, int>{{".pfm", 2}, {".ply", 1}, {".png", 1}}));
   test_support::expect_same_scene(a, load_scene(folder_.file("out.xml")), 100);

@@ -159,6 +159,7 @@ LightSource "spot" "float power" 7 "float coneangle" 40 "float conedeltaangle" 1
   ASSERT_EQ(lights.size(), 4u);
   const auto at = [&](size_t i) { return lights[i]->sample_towards({0, -1, 0.3f}, {0.5f, 0.5f}, 0.5f); };
   EXPECT_NEAR(lights[0]->power().g, 100, 1e-3f);
+  EXPECT_NEAR(lights[3]->power().g, 7, 1e-3f);
   EXPECT_NEAR(at(1).wi.y, 1, 1e-6f);
   EXPECT_NEAR(scene.scene->environment()->environment({0, 0, 1}).radiance.g, 5 / kPi, 1e-5f);
 }
@@ -432,6 +433,13 @@ Shape "sphere" "float radius" 3
   for (const char* other : {"ambientocclusion", "lightpath", "randomwalk", "function", "metropolis"})
     EXPECT_TRUE(contains(errors("Integrator \"" + std::string(other) + "\"\nWorldBegin\n"),
                          "Integrator \"" + std::string(other) + "\" is not supported; supported: integrators 'bdpt'"));
+}
+
+TEST_F(PbrtNumbers, BlanksAroundParametersAreSkipped) {
+  const LoadedScene scene = world("Shape \"sphere\" \"  float \tradius \" .5\n");
+  SurfaceHit hit;
+  ASSERT_TRUE(scene.scene->intersect({{0, 0, 3}, {0, 0, -1}}, hit));
+  EXPECT_NEAR(hit.p.z, 0.5f, 1e-5f);
 }
 
 /// film.cpp: FilmBaseParameters; filters.cpp: TriangleFilter::Create; cameras.cpp: PerspectiveCamera::Create.
