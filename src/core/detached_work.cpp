@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/detached_work.h"
 
+#include <tbb/task_group.h>
+
 #include <chrono>
 #include <condition_variable>
 #include <exception>
@@ -120,5 +122,20 @@ void run_detached(std::function<void()> job, const std::function<void()>& cancel
 }
 
 bool has_detached_work() { return Jobs::left().any(); }
+
+void run_outside(const std::function<void()>& body) {
+  // Never destroyed, because objects that keep it may live as long as the process; and never cancelled.
+  static auto* context = new tbb::task_group_context(tbb::task_group_context::isolated);
+  std::exception_ptr error;
+  tbb::task_group group(*context);
+  group.run_and_wait([&] {
+    try {
+      body();
+    } catch (...) {  // would cancel the context
+      error = std::current_exception();
+    }
+  });
+  if (error) std::rethrow_exception(error);
+}
 
 }  // namespace covary

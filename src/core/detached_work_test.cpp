@@ -2,6 +2,7 @@
 #include "core/detached_work.h"
 
 #include <gtest/gtest.h>
+#include <tbb/task_group.h>
 
 #include <atomic>
 #include <chrono>
@@ -62,6 +63,50 @@ TEST(RunDetached, LeavesTheJobBehindWhenStopped) {
   opener.join();
   EXPECT_FALSE(has_detached_work());
 }
+
+#ifndef COVARY_PLAIN_THREADS
+/// Waits until the surrounding work is stopped.
+void wait_for_stop() {
+  try {
+    for (;;) throw_if_stopped();
+  } catch (const Stopped&) {
+  }
+}
+
+/// A task group that was first used inside work does its tasks after the work was stopped. Used directly, it is a part
+/// of the work: the stop reaches it, and its tasks are skipped.
+TEST(RunOutside, KeepsTaskGroupsFromTheStop) {
+  std::atomic<bool> stop{false};
+  tbb::task_group outside;
+  run_stoppable(&stop, [&] {
+    tbb::task_group inside;
+    run_outside([&] { outside.run_and_wait([] {}); });
+    inside.run_and_wait([] {});
+    stop = true;
+    wait_for_stop();
+    int n = 0;
+    outside.run_and_wait([&] { n += 1; });
+    inside.run_and_wait([&] { n += 10; });
+    EXPECT_EQ(n, 1);
+    run_outside([&] { EXPECT_NO_THROW(throw_if_stopped()); });
+  });
+  int n = 0;
+  outside.run_and_wait([&] { n = 1; });
+  EXPECT_EQ(n, 1);
+}
+
+TEST(RunOutside, ThrowsWhatTheBodyThrows) {
+  tbb::task_group kept;
+  EXPECT_THROW(run_outside([&] {
+                 kept.run_and_wait([] {});
+                 throw std::runtime_error("x");
+               }),
+               std::runtime_error);
+  int n = 0;
+  kept.run_and_wait([&] { n = 1; });
+  EXPECT_EQ(n, 1) << "the error of one body is none of the others";
+}
+#endif
 
 }  // namespace
 }  // namespace covary

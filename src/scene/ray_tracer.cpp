@@ -12,6 +12,7 @@
 #include <map>
 #include <string>
 
+#include "core/detached_work.h"
 #include "core/error.h"
 #include "scene/analytic_shape.h"
 #include "scene/curve.h"
@@ -186,6 +187,11 @@ void place(SurfaceHit& hit, const Transform& to_world, bool with_derivatives) {
   hit.frame = Frame::from_tangent(n, hit.dp_du);
 }
 
+/// Builds the hierarchy; outside of the surrounding work, because each of Embree's scenes keeps a task group.
+void commit_scene(RTCScene scene) {
+  run_outside([scene] { rtcCommitScene(scene); });
+}
+
 void release(RTCDevice device, RTCScene top, const auto& groups) {
   if (top) rtcReleaseScene(top);
   for (const auto& group : groups) rtcReleaseScene(group.scene);
@@ -226,7 +232,7 @@ RayTracer::RayTracer(std::span<const ShapePtr> shapes, std::span<const Instance>
     for (const Instance& instance : instances)
       if (index.emplace(instance.group.get(), groups_.size()).second) {
         groups_.push_back(make_group(instance.group->shapes));
-        rtcCommitScene(groups_.back().scene);
+        commit_scene(groups_.back().scene);
       }
     for (const Instance& instance : instances) {
       const Group& group = groups_[index.at(instance.group.get())];
@@ -237,8 +243,8 @@ RayTracer::RayTracer(std::span<const ShapePtr> shapes, std::span<const Instance>
       rtcReleaseGeometry(geometry);
       placed_.push_back({&group, instance.to_world});
     }
-    rtcCommitScene(top_.scene);
-  } catch (...) {  // out of memory, or a stop (core/stop.h), which Embree turns into an error
+    commit_scene(top_.scene);
+  } catch (...) {  // out of memory
     release(device_, top_.scene, groups_);
     throw;
   }
@@ -257,7 +263,7 @@ void RayTracer::move_instance(size_t index, const Transform& to_world) {
   placed_[index].to_world = to_world;
 }
 
-void RayTracer::commit() { rtcCommitScene(top_.scene); }
+void RayTracer::commit() { commit_scene(top_.scene); }
 
 void RayTracer::nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool coherent) const {
   Query query(coherent);

@@ -2,10 +2,15 @@
 // Shapes in the ray tracer: hit positions, surface properties there, and consistency with sampling.
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <functional>
 #include <memory>
+#include <thread>
 
 #include "core/error.h"
+#include "core/parallel.h"
 #include "core/random.h"
+#include "core/stop.h"
 #include "scene/analytic_shape.h"
 #include "scene/mesh.h"
 #include "scene/scene.h"
@@ -72,6 +77,35 @@ TEST(RayTracer, SphereFromOutsideAndInside) {
   EXPECT_FALSE(scene->occluded({centre + Vec3{0, 0, 5}, {0, 0, -1}, 2.9f}));
   expect_derivatives(*scene, {centre + Vec3{0.3f, 0.4f, 5}, normalize(Vec3{0.1f, 0.05f, -1})});
 }
+
+#ifndef COVARY_PLAIN_THREADS
+/// Calls f on a stack that is n frames deeper, so that nothing lies where it lay before.
+__attribute__((noinline)) bool call_deeper(int n, const std::function<bool()>& f) {
+  volatile char frame[1024];
+  for (volatile char& c : frame) c = 1;
+  return n > 0 ? call_deeper(n - 1, f) && frame[n] : f();
+}
+
+/// A scene outlives the work that loaded it, and other work is stopped: Embree's task group must not have kept the
+/// context of the first, which TBB follows to find out what the stop concerns. It did, and the process crashed.
+TEST(RayTracer, OutlivesTheWorkThatMadeIt) {
+  std::unique_ptr<Scene> scene;
+  const std::atomic<bool> never{false};
+  ASSERT_TRUE(run_stoppable(&never, [&] {
+    scene = scene_of({std::make_shared<Sphere>(Transform(), Vec3{0, 0, 0}, 1.0f, false)});
+  }));
+  for (int i = 0; i < 20; ++i) {
+    std::atomic<bool> stop{false};
+    EXPECT_FALSE(call_deeper(1 + i % 5, [&] {
+      return run_stoppable(&stop, [&] {
+        stop = true;
+        for (;;) parallel_for(2, [](int) { std::this_thread::yield(); });
+      });
+    }));
+  }
+  EXPECT_TRUE(scene->occluded({{0, 0, 5}, {0, 0, -1}, 10}));
+}
+#endif
 
 TEST(RayTracer, DiskRespectsItsEdgeAndOrientation) {
   const auto disk = std::make_shared<Disk>(Transform::translate({0, 0, 1}) * Transform::scale({2, 1, 1}), true);

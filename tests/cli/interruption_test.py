@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ctrl-C ends every command. Each is made to wait at a pipe that nobody serves, so that nothing else can end it."""
+import math
 import os
+import random
 import re
 import signal
 import subprocess
@@ -9,6 +11,7 @@ import unittest
 from pathlib import Path
 
 from cli_test import COVARY, SLOWDOWN, CliTest
+from exr_reader import read_exr
 from exr_writer import film
 
 COMMANDS = (("info", "pipe.xml"), ("render", "pipe.xml", "-o", "a.exr"), ("experiment", "pipe.xml", "-o", "folder"),
@@ -69,6 +72,36 @@ class WhileDenoising(CliTest):
                                            env={**os.environ, "STAND_IN_BEGINS": str(begins)})
                 self.assertIn("interrupted", interrupted_when(self, process, begins.exists))
                 begins.unlink()
+
+
+class AtRandomTimes(CliTest):
+    """Ctrl-C at any moment of a render: exit code 130, and a picture if there is a sample."""
+
+    def test_render(self):
+        command = [COVARY, "render", str(Path(os.environ["SCENES"]) / "room.xml"), "--resolution", "64x48", "--spp",
+                   "24", "--denoise", "auto", "--oidn", os.environ["STAND_IN_DENOISER"], "--no-preview", "--overwrite"]
+        begin = time.monotonic()
+        self.assertEqual(self.run_covary(*command[1:], "-o", "whole.exr").returncode, 0)
+        seconds = time.monotonic() - begin
+        chance = random.Random(1)
+        pictures = 0
+        for i in range(12):
+            process = subprocess.Popen([*command, "-o", f"{i}.exr"], cwd=self.path, stderr=subprocess.PIPE, text=True)
+            time.sleep(seconds * chance.random())
+            process.send_signal(signal.SIGINT)
+            message = process.communicate(timeout=60 * SLOWDOWN)[1]
+            picture = self.path / f"{i}.exr"
+            self.assertIn(process.returncode, (0, 130), message)  # 0: it had ended
+            has_picture = "is the image so far" in message or "' was written" in message
+            if process.returncode == 0 or has_picture:
+                pictures += 1
+                values = read_exr(picture.read_bytes())
+                self.assertTrue(all(math.isfinite(v) for c in "RGB" for v in values[c]))
+                self.assertGreater(sum(values["G"]), 0)
+            else:
+                self.assertIn("interrupted", message)
+                self.assertFalse(picture.exists(), message)
+        self.assertGreater(pictures, 0)
 
 
 if __name__ == "__main__":
