@@ -172,6 +172,21 @@ TEST(ErrorSplit, FindsAOneSidedClamp) {
   EXPECT_TRUE(contains(sentences(renders_of(scene, 4, 0), references), "something is lost"));
 }
 
+// Three renders of one pixel whose brightness varies by 2 %, 2000 times: chance alone accuses 1 in 1000. Five standard
+// errors would be exceeded in 3.8 % of them (Student's distribution with two degrees of freedom).
+TEST(ErrorSplit, FewRendersAccuseNobody) {
+  Image reference(1, 1, 3);
+  reference.data = {1, 1, 1};
+  int accused = 0;
+  for (uint64_t i = 0; i < 2000; ++i) {
+    std::vector<Image> renders(3, reference);
+    for (size_t s = 0; s < 3; ++s)
+      for (float& value : renders[s].data) value += 0.02f * static_cast<float>(Synthetic::noise(3 * i + s, 0));
+    accused += contains(sentences(renders, {reference}), "the image mean is");
+  }
+  EXPECT_LE(accused, 10) << "binomial, mean 2: probability 1e-5";
+}
+
 TEST(ErrorSplit, LeavesOutNonFinitePixelsOfAnyRender) {
   const Synthetic scene;
   std::vector<Image> renders = renders_of(scene, 3, 0);

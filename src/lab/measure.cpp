@@ -132,32 +132,37 @@ double temporal(const RunResult& run) { return run.temporal; }
 double seconds(const RunResult& run) { return run.record.method_seconds(); }
 double mean(const std::vector<double>& values) { return mean_estimate(values).value; }
 
-double mean_without(const std::vector<double>& values, size_t left_out) {
-  const double n = static_cast<double>(values.size());
-  return (mean(values) * n - values[left_out]) / (n - 1);
-}
-
-/// 1 / (mean error x mean seconds).
-Estimate efficiency(const Cell& cell) {
-  const std::vector<double> errors = values_of(cell, relmse), times = values_of(cell, seconds);
-  return jackknife(1 / (mean(errors) * mean(times)), errors.size(),
-                   [&](size_t i) { return 1 / (mean_without(errors, i) * mean_without(times, i)); });
-}
-
 /// Values of the runs of both cells, paired by seed.
 template <typename Value>
-std::pair<std::vector<double>, std::vector<double>> in_pairs(const Cell& a, const Cell& b, Value&& value) {
-  std::pair<std::vector<double>, std::vector<double>> result;
+Pairs in_pairs(const Cell& a, const Cell& b, Value&& value) {
+  Pairs pairs;
   for (const RunResult& run : a.runs)
-    for (const RunResult& other : b.runs)
-      if (run.seed == other.seed) result.first.push_back(value(run)), result.second.push_back(value(other));
-  return result;
+    for (const RunResult& other : b.runs) {
+      if (run.seed != other.seed) continue;
+      pairs.seeds.push_back(run.seed);
+      pairs.a.push_back(value(run)), pairs.b.push_back(value(other));
+    }
+  return pairs;
 }
 
-template <typename Value>
-Estimate ratio(const Cell& numerator, const Cell& denominator, Value&& value) {
-  const auto [a, b] = in_pairs(numerator, denominator, value);
-  return ratio_of_means(a, b);
+Estimate ratio(const Pairs& pairs) { return ratio_of_means(pairs.a, pairs.b); }
+
+/// What the ratio to the baseline at equal samples is of.
+Pairs at_equal_samples(const Cell& base, const Cell& cell) {
+  if (!cell.equal_sample_normalised) return in_pairs(base, cell, relmse);
+  return in_pairs(base, cell, [](const RunResult& r) { return r.relmse * r.record.samples_per_pixel; });
+}
+
+/// The same at equal time. With a budget in seconds, the errors themselves are at equal time.
+Pairs at_equal_time(const Cell& base, const Cell& cell, const Budget& budget) {
+  if (budget.seconds > 0) return in_pairs(base, cell, relmse);
+  return in_pairs(base, cell, [](const RunResult& r) { return r.relmse * seconds(r); });
+}
+
+size_t baseline_of(const Suite& suite) {
+  size_t baseline = 0;
+  while (suite.methods[baseline].name != suite.baseline) ++baseline;
+  return baseline;
 }
 
 double published(const std::map<std::string, std::map<std::string, std::map<std::string, double>>>& table,
@@ -226,14 +231,15 @@ std::optional<Summary> summary_of(const Results& results, const std::vector<size
   }
   if (!has_cells) return {};
   if (summary.unusable.size() == results.scenes.size()) return summary;
-  std::vector<Estimate> equal_sample, equal_time, error, published_ratio;
-  std::vector<double> samples, flip;
+  std::vector<Pairs> equal_sample, equal_time;
+  std::vector<double> error, published_ratio, samples, flip;
   for (size_t s : common) {
     const Cell& cell = *results.find(s, method, budget);
-    equal_sample.push_back(cell.equal_sample);
-    equal_time.push_back(cell.equal_time);
-    error.push_back(cell.split.relative.error);
-    published_ratio.push_back({cell.published_ratio, kNone, kNone, kNone});
+    const Cell& base = *results.find(s, baseline_of(results.suite), budget);
+    if (results.suite.budgets[budget].spp) equal_sample.push_back(at_equal_samples(base, cell));
+    equal_time.push_back(at_equal_time(base, cell, results.suite.budgets[budget]));
+    error.push_back(cell.split.relative.error.value);
+    published_ratio.push_back(cell.published_ratio);
     samples.push_back(cell.samples_per_pixel);
     flip.push_back(cell.flip.value);
     summary.equal_sample_normalised = summary.equal_sample_normalised || cell.equal_sample_normalised;
@@ -241,13 +247,11 @@ std::optional<Summary> summary_of(const Results& results, const std::vector<size
   summary.n_scenes = common.size();
   if (common.empty()) return summary;
   summary.samples_per_pixel = mean(samples);
-  summary.equal_sample = geometric_mean(equal_sample);
-  summary.equal_time = geometric_mean(equal_time);
-  summary.relmse = geometric_mean(error).value;
+  summary.equal_sample = geometric_mean_of_ratios(equal_sample);
+  summary.equal_time = geometric_mean_of_ratios(equal_time);
+  summary.relmse = geometric_mean(error);
   summary.flip = mean(flip);
-  size_t n_published = 0;
-  const Estimate published = geometric_mean(published_ratio, &n_published);
-  if (n_published == common.size()) summary.published_ratio = published.value;
+  summary.published_ratio = geometric_mean(published_ratio);
   return summary;
 }
 
@@ -309,7 +313,7 @@ void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& r
   cell.samples_per_pixel = mean(values_of(cell, [](const RunResult& r) { return r.record.samples_per_pixel; }));
   for (const RunResult& run : cell.runs)
     cell.peak_memory_bytes = std::max(cell.peak_memory_bytes, run.record.peak_memory_bytes);
-  cell.efficiency = efficiency(cell);
+  cell.efficiency = reciprocal_of_means(values_of(cell, relmse), values_of(cell, seconds));
   cell.predicted_over_true =
       ratio_of_means(values_of(cell, [](const RunResult& r) { return r.predicted_relmse; }), values_of(cell, relmse));
   cell.coverage = mean_estimate(values_of(cell, [](const RunResult& r) { return r.coverage; }));
@@ -324,8 +328,7 @@ void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& r
 
 void compare_cells(Results& results) {
   const Suite& suite = results.suite;
-  size_t baseline = 0;
-  while (suite.methods[baseline].name != suite.baseline) ++baseline;
+  const size_t baseline = baseline_of(suite);
   for (Cell& cell : results.cells) {
     const std::string& scene = suite.scenes[cell.scene].name;
     const std::string& method = suite.methods[cell.method].name;
@@ -335,22 +338,14 @@ void compare_cells(Results& results) {
     const Cell* base = results.find(cell.scene, baseline, cell.budget);
     if (!base) continue;
     if (!cell.frames.empty() && cell.frames.size() == base->frames.size()) {
-      cell.temporal_gain = ratio(*base, cell, temporal);
+      cell.temporal_gain = ratio(in_pairs(*base, cell, temporal));
       cell.worst = worst_regions(cell.frames, base->frames);
     }
-    // With a budget in seconds, the errors themselves are at equal time.
-    const Estimate errors = ratio(*base, cell, relmse);
-    if (budget.seconds > 0) {
-      cell.equal_time = errors;
-      continue;
-    }
+    cell.equal_time = ratio(at_equal_time(*base, cell, budget));
+    if (budget.seconds > 0) continue;
     const double taken = cell.samples_per_pixel, taken_by_base = base->samples_per_pixel;
     cell.equal_sample_normalised = std::abs(taken - taken_by_base) > kSameSamples * std::min(taken, taken_by_base);
-    cell.equal_sample =
-        cell.equal_sample_normalised
-            ? ratio(*base, cell, [](const RunResult& r) { return r.relmse * r.record.samples_per_pixel; })
-            : errors;
-    cell.equal_time = ratio(*base, cell, [](const RunResult& r) { return r.relmse * seconds(r); });
+    cell.equal_sample = ratio(at_equal_samples(*base, cell));
   }
   for (size_t s = 0; s < results.scenes.size(); ++s)
     for (size_t m = 0; m < suite.methods.size(); ++m)

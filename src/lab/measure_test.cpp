@@ -251,6 +251,8 @@ TEST(CompareCells, RatiosAreAgainstTheBaselineWithTheSameBudget) {
   EXPECT_NEAR(results.slopes[1].exponent.value, -1, 1e-9) << "four times the samples, a quarter of the error";
   ASSERT_EQ(results.summaries.size(), 4u);
   EXPECT_EQ(results.summaries[1].n_scenes, 1u);
+  EXPECT_EQ(results.summaries[1].equal_sample.low, first.equal_sample.low) << "of one scene, the mean is the cell";
+  EXPECT_EQ(results.summaries[1].equal_time.high, first.equal_time.high);
 }
 
 /// 48 samples against the baseline's 32: a third of the error is a half at equal samples.

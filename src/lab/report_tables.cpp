@@ -364,14 +364,14 @@ Json front_plot(const Results& results, size_t budget) {
   Json series = Json::array();
   std::string alt;
   for (size_t m = 0; m < suite.methods.size(); ++m) {
-    std::vector<Estimate> gains;
+    std::vector<double> gains;
     double share = 0, square = 0;
     for (const Cell& cell : results.cells) {
       const SplitError& split = cell.split.relative;
       if (cell.method != m || cell.budget != budget || !std::isfinite(split.squared_bias.value / split.error.value) ||
           !std::isfinite(cell.equal_sample.value))
         continue;
-      gains.push_back(cell.equal_sample);
+      gains.push_back(cell.equal_sample.value);
       share += split.squared_bias.value / split.error.value;
       const double width = (split.squared_bias.high - split.squared_bias.low) / 2 / split.error.value;
       square += width * width;  // NaN with two seeds, which give no interval
@@ -379,7 +379,7 @@ Json front_plot(const Results& results, size_t budget) {
     // Means over fewer scenes are not comparable.
     if (gains.empty() || static_cast<ptrdiff_t>(gains.size()) < n_scenes) continue;
     const auto n = static_cast<double>(gains.size());
-    const double error = 1 / geometric_mean(gains).value;
+    const double error = 1 / geometric_mean(gains);
     share /= n;
     const double width = std::sqrt(square) / n;
     series.push_back({{"name", suite.methods[m].name},

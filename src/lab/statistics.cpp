@@ -5,6 +5,7 @@
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <numeric>
+#include <set>
 
 #include "core/error.h"
 
@@ -19,6 +20,37 @@ double mean(std::span<const double> values) {
 double mean_without(std::span<const double> values, size_t left_out) {
   const double sum = std::accumulate(values.begin(), values.end(), 0.0) - values[left_out];
   return sum / static_cast<double>(values.size() - 1);
+}
+
+/// NaN if a mean is not positive.
+double log_ratio(std::span<const double> a, std::span<const double> b) {
+  return mean(a) > 0 && mean(b) > 0 ? std::log(mean(a) / mean(b)) : kNone;
+}
+double log_ratio(const Pairs& pairs) { return log_ratio(pairs.a, pairs.b); }
+
+Pairs without(Pairs pairs, uint64_t seed) {
+  for (size_t i = pairs.seeds.size(); i-- > 0;)
+    if (pairs.seeds[i] == seed) {
+      const auto at = static_cast<ptrdiff_t>(i);
+      pairs.seeds.erase(pairs.seeds.begin() + at);
+      pairs.a.erase(pairs.a.begin() + at);
+      pairs.b.erase(pairs.b.begin() + at);
+    }
+  return pairs;
+}
+
+/// Standard error of a statistic from its values without one item each.
+double jackknife_error(std::span<const double> parts) {
+  const double n = static_cast<double>(parts.size()), m = mean(parts);
+  double squares = 0;
+  for (const double part : parts) squares += (part - m) * (part - m);
+  return std::sqrt(squares * (n - 1) / n);
+}
+
+/// From the estimate of a logarithm.
+Estimate exponential(const Estimate& log) {
+  const double value = std::exp(log.value);
+  return {value, value * log.standard_error, std::exp(log.low), std::exp(log.high)};
 }
 
 }  // namespace
@@ -46,39 +78,49 @@ Estimate jackknife(double value, size_t n, const std::function<double(size_t)>& 
   if (n < 2) return {value, kNone, kNone, kNone};
   std::vector<double> parts(n);
   for (size_t i = 0; i < n; ++i) parts[i] = without(i);
-  const double m = mean(parts);
-  double squares = 0;
-  for (double part : parts) squares += (part - m) * (part - m);
-  return with_interval(value, std::sqrt(squares * static_cast<double>(n - 1) / static_cast<double>(n)),
-                       static_cast<int>(n) - 1);
+  return with_interval(value, jackknife_error(parts), static_cast<int>(n) - 1);
 }
 
 Estimate ratio_of_means(std::span<const double> a, std::span<const double> b) {
   COVARY_CHECK(a.size() == b.size(), "values in pairs");
-  if (a.empty()) return {};
-  const double value = std::log(mean(a) / mean(b));
-  if (!std::isfinite(value)) return {};
-  const Estimate log_ratio =
-      jackknife(value, a.size(), [&](size_t i) { return std::log(mean_without(a, i) / mean_without(b, i)); });
-  const double ratio = std::exp(value);
-  return {ratio, ratio * log_ratio.standard_error, std::exp(log_ratio.low), std::exp(log_ratio.high)};
+  Pairs pairs{std::vector<uint64_t>(a.size()), {a.begin(), a.end()}, {b.begin(), b.end()}};
+  std::iota(pairs.seeds.begin(), pairs.seeds.end(), 0);
+  return geometric_mean_of_ratios({&pairs, 1});
 }
 
-Estimate geometric_mean(std::span<const Estimate> ratios, size_t* n_used) {
-  double log_sum = 0, variance = 0;
-  size_t n = 0;
-  for (const Estimate& ratio : ratios) {
-    if (!(ratio.value > 0) || !std::isfinite(ratio.value)) continue;
-    log_sum += std::log(ratio.value);
-    const double relative = ratio.standard_error / ratio.value;
-    variance += relative * relative;
-    ++n;
+Estimate geometric_mean_of_ratios(std::span<const Pairs> items) {
+  std::set<uint64_t> seeds;
+  size_t fewest = SIZE_MAX;
+  double sum = 0;
+  for (const Pairs& item : items) {
+    COVARY_CHECK(item.a.size() == item.seeds.size() && item.b.size() == item.seeds.size(), "values in pairs");
+    seeds.insert(item.seeds.begin(), item.seeds.end());
+    fewest = std::min(fewest, item.seeds.size());
+    sum += log_ratio(item.a, item.b);
   }
-  if (n_used) *n_used = n;
-  if (n == 0) return {};
-  const double count = static_cast<double>(n), value = std::exp(log_sum / count);
-  const double relative = std::sqrt(variance) / count, factor = std::exp(1.959964 * relative);
-  return {value, value * relative, value / factor, value * factor};
+  const double n = static_cast<double>(items.size());
+  if (items.empty() || !std::isfinite(sum)) return {};
+  std::vector<double> parts;
+  for (const uint64_t seed : seeds) {
+    double part = 0;
+    for (const Pairs& item : items) part += log_ratio(without(item, seed));
+    parts.push_back(part / n);
+  }
+  return exponential(with_interval(sum / n, jackknife_error(parts), fewest < 2 ? 0 : static_cast<int>(fewest) - 1));
+}
+
+double geometric_mean(std::span<const double> values) {
+  double sum = 0;
+  for (const double value : values) sum += value > 0 ? std::log(value) : kNone;
+  return std::exp(sum / static_cast<double>(values.size()));
+}
+
+Estimate reciprocal_of_means(std::span<const double> a, std::span<const double> b) {
+  COVARY_CHECK(a.size() == b.size(), "values in pairs");
+  const double value = 1 / (mean(a) * mean(b));
+  if (!(mean(a) > 0) || !(mean(b) > 0)) return {value, kNone, kNone, kNone};
+  return exponential(jackknife(std::log(value), a.size(),
+                               [&](size_t i) { return -std::log(mean_without(a, i) * mean_without(b, i)); }));
 }
 
 double weighted_slope(std::span<const double> x, std::span<const double> y, std::span<const double> sigma) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <span>
@@ -30,13 +31,26 @@ Estimate mean_estimate(std::span<const double> values);
 /// Jackknife over n independent items: `without(i)` is the statistic without item i.
 Estimate jackknife(double value, size_t n, const std::function<double(size_t)>& without);
 
-/// mean(a) / mean(b) of paired values, item i of both from the same seed; jackknife of the logarithm. NaN if a mean is
-/// not positive.
+/// Values of two methods in pairs, pair i of both from seeds[i]. No seed occurs twice.
+struct Pairs {
+  std::vector<uint64_t> seeds;
+  std::vector<double> a, b;
+};
+
+/// mean(a) / mean(b); jackknife of the logarithm. NaN if a mean is not positive.
 Estimate ratio_of_means(std::span<const double> a, std::span<const double> b);
 
-/// Geometric mean of independent ratios, each with its own uncertainty: items are fixed, not drawn from a population.
-/// NaN ratios are left out; `n_used`: how many remained.
-Estimate geometric_mean(std::span<const Estimate> ratios, size_t* n_used = nullptr);
+/// Geometric mean over `items` of mean(a) / mean(b); jackknife of the logarithm over the seeds, each of which is left
+/// out of all items at once, because what it draws may have the same effect on all of them. The items are fixed, not
+/// drawn from a population. Student's t has as many degrees of freedom as the item with the fewest seeds. NaN if a mean
+/// is not positive, or without items.
+Estimate geometric_mean_of_ratios(std::span<const Pairs> items);
+
+/// NaN without values or if one is not positive.
+double geometric_mean(std::span<const double> values);
+
+/// 1 / (mean(a) mean(b)) of values in pairs; jackknife of the logarithm. No interval if a mean is not positive.
+Estimate reciprocal_of_means(std::span<const double> a, std::span<const double> b);
 
 /// Slope of a least-squares line through (x, y) with weights 1/sigma^2, all sigma > 0; needs two different x.
 double weighted_slope(std::span<const double> x, std::span<const double> y, std::span<const double> sigma);

@@ -67,12 +67,57 @@ TEST(Statistics, RatioOfPairs) {
 }
 
 TEST(Statistics, GeometricMean) {
-  size_t n = 0;
-  const std::array ratios{Estimate{2, 0.2, 0, 0}, Estimate{8, 0, 0, 0}, Estimate{}};
-  const Estimate mean = geometric_mean(ratios, &n);
-  EXPECT_EQ(n, 2u);
-  EXPECT_NEAR(mean.value, 4, 1e-12);
-  EXPECT_NEAR(mean.standard_error, 4 * 0.1 / 2, 1e-12);
+  EXPECT_NEAR(geometric_mean(std::array{2.0, 8.0}), 4, 1e-12);
+  EXPECT_TRUE(std::isnan(geometric_mean(std::array{2.0, kNone})));
+  EXPECT_TRUE(std::isnan(geometric_mean(std::vector<double>{})));
+}
+
+// The mean of one ratio is that ratio, with the same interval: Student's factor for one degree of freedom is 12.706.
+TEST(Statistics, GeometricMeanOfOneRatio) {
+  const Pairs pairs{{1, 2}, {3, 5}, {1, 1.5}};
+  const Estimate one = ratio_of_means(pairs.a, pairs.b), mean = geometric_mean_of_ratios({&pairs, 1});
+  EXPECT_EQ(mean.value, one.value);
+  EXPECT_EQ(mean.low, one.low);
+  EXPECT_EQ(mean.high, one.high);
+  EXPECT_NEAR(std::log(one.high / one.value), 12.706 * one.standard_error / one.value, 1e-4);
+  // Ratios 2 and 8 of two items, equal for all seeds but one that one item lacks.
+  const std::array items{Pairs{{1, 2, 3}, {2, 2, 2}, {1, 1, 1}}, Pairs{{1, 3}, {8, 8}, {1, 1}}};
+  const Estimate exact = geometric_mean_of_ratios(items);
+  EXPECT_NEAR(exact.value, 4, 1e-12);
+  EXPECT_NEAR(exact.high, 4, 1e-12);
+  EXPECT_TRUE(std::isnan(geometric_mean_of_ratios(std::array{items[0], Pairs{{1}, {8}, {1}}}).low)) << "one seed";
+  EXPECT_TRUE(std::isnan(geometric_mean_of_ratios(std::array{items[0], Pairs{{1, 2}, {8, -9}, {1, 1}}}).value));
+}
+
+// Errors of K seeds in four scenes, with a relative noise of 5, 10, 20 and 30 %, half of whose variance all scenes have
+// in common, as from common random numbers. N = 4000 experiments; binomial standard deviation 0.34 %, alpha = 1e-5:
+// 1.5 %, and 1 % because logarithms of means of so noisy values are not exactly normal. With 1.96 in place of Student's
+// factor, 82 % would hold for three seeds, 88 % for five.
+TEST(Statistics, IntervalsOfMeansHoldForFewSeeds) {
+  const std::array<double, 4> noise{0.05, 0.1, 0.2, 0.3};
+  for (const uint64_t n_seeds : {3, 5, 10}) {
+    int mean_held = 0, ratio_held = 0, geometric_held = 0, reciprocal_held = 0;
+    for (uint64_t i = 0; i < 4000; ++i) {
+      const auto draw = [&](uint64_t s, uint64_t k) { return normal(7919 * n_seeds + i, 16 * s + k); };
+      std::array<Pairs, 4> scenes;
+      for (uint64_t s = 0; s < n_seeds; ++s)
+        for (size_t k = 0; k < 4; ++k) {
+          scenes[k].seeds.push_back(s);
+          scenes[k].a.push_back((2.0 + static_cast<double>(k)) *
+                                (1 + noise[k] * (draw(s, 0) + draw(s, 1 + k)) / std::sqrt(2.0)));
+          scenes[k].b.push_back(1 + 0.05 * draw(s, 5 + k));
+        }
+      const auto holds = [](const Estimate& e, double truth) { return e.low <= truth && truth <= e.high; };
+      mean_held += holds(mean_estimate(scenes[1].a), 3);
+      ratio_held += holds(ratio_of_means(scenes[1].a, scenes[1].b), 3);
+      geometric_held += holds(geometric_mean_of_ratios(scenes), std::pow(2.0 * 3 * 4 * 5, 0.25));
+      reciprocal_held += holds(reciprocal_of_means(scenes[1].a, scenes[1].b), 1 / 3.0);
+    }
+    EXPECT_NEAR(mean_held / 4000.0, 0.95, 0.015) << n_seeds;
+    EXPECT_NEAR(ratio_held / 4000.0, 0.95, 0.025) << n_seeds;
+    EXPECT_NEAR(geometric_held / 4000.0, 0.95, 0.025) << n_seeds;
+    EXPECT_NEAR(reciprocal_held / 4000.0, 0.95, 0.025) << n_seeds;
+  }
 }
 
 TEST(Statistics, WeightedSlope) {
