@@ -9,6 +9,7 @@ namespace covary {
 struct Parallelogram {
   Vec3 origin, dp_du, dp_dv, n;  ///< n: unit normal
   float inverse_area = 0;
+  float slack = 0;  ///< of its points (core/rounding.h)
 };
 
 }  // namespace covary

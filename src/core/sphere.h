@@ -22,16 +22,18 @@ struct Ball {
     const Vec3 to_center = center - reference;
     return Frame(to_center * (1 / std::sqrt(length_squared(to_center)))).to_world(local);
   }
-  /// Of the nearer intersection.
+  /// Of the nearer intersection. Relative to the point of the ray nearest to the centre, without cancellation.
   float distance(const Vec3& reference, const Vec3& wi) const {
     const Vec3 to_center = center - reference;
     const float b = dot(to_center, wi);
-    return b - safe_sqrt(radius * radius - std::max(0.0f, length_squared(to_center) - b * b));
+    return b - safe_sqrt(radius * radius - length_squared(wi * b - to_center));
   }
   /// Unit vector from the centre to the point at `distance`.
   Vec3 outward(const Vec3& reference, const Vec3& wi, float distance) const {
-    return normalize(reference + wi * distance - center);
+    return normalize(wi * distance - (center - reference));
   }
+  /// Of its points (core/rounding.h): that of the vector from the centre, which is normalised.
+  float slack() const { return 6 * radius; }
 };
 
 }  // namespace covary

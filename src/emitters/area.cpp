@@ -97,6 +97,7 @@ EmissionSample AreaLight::sample_emission(Vec2 u_position, Vec2 u_direction, flo
   if (!(area.pdf_area > 0) || !(w.z > 0)) return sample;
   sample.ray = {area.p, Frame(area.n).to_world(w)};
   sample.n = area.n;
+  sample.offset = surface_offset(area.p, area.n, area.slack);
   sample.uv = area.uv;
   sample.radiance = radiance_at(area);
   sample.pdf_position = area.pdf_area;

@@ -284,11 +284,9 @@ class BidirectionalTracer final : public LightTracingIntegrator {
                             end.bsdf.reverse_pdf(end.wo, wi_camera));
     const float factor = parts_.adjoint_factor(light.wo, wi_light, light.ng_local) / distance_squared;
     const Spectrum value = end.path.throughput * camera_f.value * (light.throughput * light_f.value * factor);
-    const Vec3 o = offset_origin(end.hit, w);
-    const Vec3 target = offset_origin(light.p, light.ng, light.offset, -w);
-    const float distance = length(target - o);
-    const Ray ray{o, (target - o) * (1 / distance), distance * (1 - kRayEpsilon)};
-    connect(value, 1 / (1 + others), ray, static_cast<int>(light.n_vertices), end, state);
+    const Vec3 target = offset_target(light.p, light.ng, light.offset, w, std::sqrt(distance_squared));
+    connect(value, 1 / (1 + others), ray_between(offset_origin(end.hit, w), target), static_cast<int>(light.n_vertices),
+            end, state);
   }
 
   static void connect(const Spectrum& value, double weight, const Ray& ray, int s, const CameraVertex& end,

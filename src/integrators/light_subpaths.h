@@ -91,7 +91,7 @@ class LightSubpaths {
   };
 
   template <typename Parts>
-  void emit(const Parts& parts, const Scene& scene, const PowerLights& lights, std::span<const PathRandom> randoms);
+  void emit(const Parts& parts, const PowerLights& lights, std::span<const PathRandom> randoms);
   /// The sums of a path at the first surface it hits.
   static SubpathSums first_sums(const Scene& scene, const BidirectionalMis& mis, const Start& start, const Path& path,
                                 const Ray& ray, const SurfaceHit& hit, double cosine);
@@ -109,8 +109,7 @@ class LightSubpaths {
 };
 
 template <typename Parts>
-void LightSubpaths::emit(const Parts& parts, const Scene& scene, const PowerLights& lights,
-                         std::span<const PathRandom> randoms) {
+void LightSubpaths::emit(const Parts& parts, const PowerLights& lights, std::span<const PathRandom> randoms) {
   paths_.clear(), rays_.clear();
   starts_.resize(randoms.size());
   for (uint32_t i = 0; i < randoms.size(); ++i) {
@@ -123,10 +122,9 @@ void LightSubpaths::emit(const Parts& parts, const Scene& scene, const PowerLigh
     const Vec3& d = from.ray.d;
     const Spectrum throughput = from.radiance * (std::abs(dot(from.n, d)) / (pmf * pdf));
     starts_[i] = {&emitter, from.n, from.uv, lights.pmf(emitter), {from.pdf_position, from.pdf_direction}};
-    const bool on_surface = !from.delta_position && !emitter.is_infinite();
     const Vec3& p = from.ray.o;
     paths_.push_back({throughput, 1 / max_component(throughput), {}, p, i});
-    rays_.push_back({on_surface ? offset_origin(p, from.n, scene.ray_offset(p), d) : p, d, kInfinity});
+    rays_.push_back({offset_origin(p, from.n, from.offset, d), d, kInfinity});
   }
 }
 
@@ -151,7 +149,7 @@ void LightSubpaths::trace(const Parts& parts, const Scene& scene, const PowerLig
   vertices_.start(randoms.size());
   closures_.reset();
   if (max_surfaces > 0 && !lights.empty())
-    emit(parts, scene, lights, randoms);
+    emit(parts, lights, randoms);
   else
     paths_.clear(), rays_.clear();
   for (int depth = 0; !paths_.empty() && !context.stopped(); ++depth) {

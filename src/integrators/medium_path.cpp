@@ -70,8 +70,7 @@ bool MediumPath::scatter_in_medium(const Vec3& p) {
     const EmitterSample light = sample_light(emitter, p, vertex);
     if (light.pdf_solid_angle > 0) {
       const float value = phase.pdf(ray_.d, light.wi);
-      const float distance = light.distance == kInfinity ? kInfinity : light.distance * (1 - 10 * kRayEpsilon);
-      connect(light, emitter, {p, light.wi, distance}, medium_, Spectrum(value), value);
+      connect(light, emitter, shadow_ray(p, light), medium_, Spectrum(value), value);
     }
   }
   const Vec3 w = phase.sample(ray_.d, sample_.random.get_2d(vertex, Event::kDirection));
@@ -170,14 +169,14 @@ void MediumPath::connect(const EmitterSample& light, const Emitter& emitter, con
   const Spectrum unblocked = weights_.throughput * value * light.radiance;
   if (is_black(unblocked)) return;
   SpectralWeights weights;
-  if (!light_arrives(shadow, medium, weights)) return;
+  if (!light_arrives(shadow, light, medium, weights)) return;
   Spectrum pdf = weights.pdf_light * (lights_.pmf(emitter) * light.pdf_solid_angle);
   if (!light.is_delta) pdf += weights.pdf_path * pdf_direction;
   add(emitter, unblocked * weights.throughput * (1 / mean(weights_.pdf_path * pdf)));
 }
 
 /// Follows a shadow ray through boundaries and media; false if nothing arrives.
-bool MediumPath::light_arrives(Ray ray, const Medium* medium, SpectralWeights& weights) {
+bool MediumPath::light_arrives(Ray ray, const EmitterSample& light, const Medium* medium, SpectralWeights& weights) {
   FlightNumbers numbers(sample_.random, n_smooth_);
   SurfaceHit hit;
   while (!context_.stopped()) {
@@ -189,9 +188,8 @@ bool MediumPath::light_arrives(Ray ray, const Medium* medium, SpectralWeights& w
     const NullPassage passage = null_passage(hit, ray.d);
     weights.throughput *= passage.transmittance, weights.pdf_path *= passage.pmf;
     if (hit.shape->bounds_medium()) medium = hit.shape->medium_towards(hit.ng, ray.d);
-    ray.o = offset_origin(hit, ray.d);
-    ray.t_max -= hit.t;
-    if (!(ray.t_max > 0)) return true;
+    ray = shadow_ray(hit, light);
+    if (dot(ray.d, light.wi) < 0) return true;  // beyond the light by rounding
   }
   return false;
 }

@@ -43,7 +43,7 @@ class MediumPath {
     sample_.radiance += radiance;
     if (parts_) parts_->add(light, number_, radiance, context_);
   }
-  bool light_arrives(Ray ray, const Medium* medium, SpectralWeights& weights);
+  bool light_arrives(Ray ray, const EmitterSample& light, const Medium* medium, SpectralWeights& weights);
 
   const Scene& scene_;
   const PathLengthSettings& lengths_;

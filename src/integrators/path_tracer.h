@@ -149,7 +149,7 @@ class PathTracer final : public Integrator {
     void finish_apart(int depth) {
       LambertianBlock& block = batch.block;
       if (block.size() == 0) return;
-      block.find_surfaces(scene);
+      block.find_surfaces();
       block.draw_numbers();
       if (connecting) connect_block(block);
       block.scatter();

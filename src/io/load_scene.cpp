@@ -20,6 +20,7 @@
 #include "io/scene_jobs.h"
 #include "io/sensor.h"
 #include "io/shapes.h"
+#include "io/thin_shapes.h"
 #include "scene/mesh.h"
 
 namespace covary {
@@ -45,6 +46,8 @@ class Loader {
     result_.has_delta_lights_and_surfaces = has_delta_lights() && has_delta_surfaces();
     result_.scene = std::make_unique<Scene>(std::move(parts_));
     result_.scene->move_to(sensor_made_->shutter_open);
+    const auto name_of = [&](const Shape& shape) { return names_[&shape]; };
+    warn_of_thin_shapes(*result_.scene, name_of, result_.warnings);
   }
 
  private:
@@ -60,8 +63,6 @@ class Loader {
     return any(parts_.shapes) || std::any_of(parts_.instances.begin(), parts_.instances.end(),
                                              [&](const Instance& instance) { return any(instance.group->shapes); });
   }
-
-  // ---- assembly ----
 
   void assemble() {
     held_ = held_objects(*xml_.scene);
@@ -100,7 +101,7 @@ class Loader {
         ShapeJob& job = *jobs_.shape(object.get());
         finish_shape(job);
         if (job.shape && job.to_world)
-          place_copy(copies_of(job.shape, job.light, object->where), Transform(), job.to_world);
+          place_copy(copies_of(job.shape, job.light, object->where), *job.shape, Transform(), job.to_world);
         else if (job.shape)
           parts_.shapes.push_back(job.shape);
       }
@@ -135,6 +136,7 @@ class Loader {
     const ShapeMedia media = read_media(p, job.in_group);
     if (job.asked_everything) p.report_unknown();
     if (!job.shape) return;
+    names_[job.shape.get()] = fmt::format("{}: shape '{}'", job.description->where.text(), job.description->type);
 
     for (const std::string& name : wanted_attributes(*job.description))
       if (!job.shape->has_attribute(name))
@@ -162,12 +164,13 @@ class Loader {
     }
   }
 
-  /// Adds the copy of a shape at `to_world`, or one moved by `animation`.
-  void place_copy(std::function<ShapePtr(const Transform&)> copy_to, const Transform& to_world,
+  /// Adds the copy of `original` at `to_world`, or one moved by `animation`.
+  void place_copy(std::function<ShapePtr(const Transform&)> copy_to, const Shape& original, const Transform& to_world,
                   const KeyedTransformPtr& animation) {
     try {
       const ShapePtr shape = copy_to(animation ? animation->at(0) : to_world);
       if (animation) parts_.movements.push_back({animation, parts_.shapes.size(), std::move(copy_to)});
+      names_[shape.get()] = names_[&original];
       if (shape->emitter()) parts_.emitters.push_back(shape->shared_emitter());
       parts_.shapes.push_back(shape);
     } catch (const Error& error) {
@@ -270,7 +273,7 @@ class Loader {
     check_copies(*object, *groups[0]);
     // Emissive shapes are copied, so that each copy is a light with its own area and position.
     for (const GroupLight& member : group_lights_[groups[0].get()])
-      place_copy(copies_of(member.shape, member.light, object->where), instance.to_world, animation);
+      place_copy(copies_of(member.shape, member.light, object->where), *member.shape, instance.to_world, animation);
     instance.group = groups[0];
     if (instance.group->shapes.empty()) return;
     if (animation) parts_.movements.push_back({animation, parts_.instances.size(), {}});
@@ -377,6 +380,7 @@ class Loader {
   DefaultBsdf default_bsdfs_[2];  // of non-emissive and emissive shapes
   ObjectPtr sensor_, integrator_, environment_;
   std::shared_ptr<const SensorSettings> sensor_made_;
+  std::map<const Shape*, std::string> names_;  // place in the file and type
   size_t n_degenerate_ = 0, n_degenerate_meshes_ = 0;
   SourceLocation first_degenerate_;
 };
@@ -390,8 +394,7 @@ LoadedScene load_scene_text(std::string_view xml, const std::string& name, const
 }
 
 LoadedScene load_scene(const std::string& path, const LoadOptions& options) {
-  const FileView file(path);
-  return load_scene_text(file.text(), path, options);
+  return load_scene_text(FileView(path).text(), path, options);
 }
 
 }  // namespace covary

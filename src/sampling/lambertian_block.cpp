@@ -82,12 +82,14 @@ void LambertianBlock::draw_numbers() {
   });
 }
 
-void LambertianBlock::find_surfaces(const Scene& scene) {
+void LambertianBlock::find_surfaces() {
   for_each_lane([&](int l) {
     const float b1 = b1_[l], b2 = b2_[l], b0 = 1 - b1 - b2;
     const Vec3 p0 = corners_[0].p[l], p1 = corners_[1].p[l], p2 = corners_[2].p[l];
-    const Vec3 at = p0 * b0 + p1 * b1 + p2 * b2;
-    const Vec3 ng = normalize(cross(p1 - p0, p2 - p0));
+    const Vec3 e1 = p1 - p0, e2 = p2 - p0, normal = cross(e1, e2);
+    const float inverse = 1 / length(normal), margin = edge_margin(p0, e1, e2, inverse);
+    const Vec3 d1 = e1 * lerp(margin, b1, 1.0f / 3), d2 = e2 * lerp(margin, b2, 1.0f / 3);
+    const Vec3 at = p0 + (d1 + d2), ng = normal * inverse;
     const Vec3 interpolated = corners_[0].n[l] * b0 + corners_[1].n[l] * b1 + corners_[2].n[l] * b2;
     const float l2 = length_squared(interpolated);
     const float scale = 1 / std::sqrt(l2);
@@ -97,7 +99,7 @@ void LambertianBlock::find_surfaces(const Scene& scene) {
     const Frame frame(n);
     p.set(l, at), ng_.set(l, ng);
     s_.set(l, frame.s), t_.set(l, frame.t), n_.set(l, frame.n);
-    offset_[l] = scene.ray_offset(at);
+    offset_[l] = surface_offset(at, ng, plane_slack(abs(d1) + abs(d2), e1, e2, inverse));
     const float cosine = dot(wo_[l], frame.n);
     side_[l] = cosine > 0 ? 1 : (both_sides_[l] && -cosine > 0 ? -1 : 0);
   });
@@ -137,7 +139,7 @@ void LambertianBlock::set_parallelogram(int l, const ParallelogramLight& light) 
   const Parallelogram& surface = light.surface;
   light_origin_.set(l, surface.origin), light_n_.set(l, surface.n);
   light_dp_du_.set(l, surface.dp_du), light_dp_dv_.set(l, surface.dp_dv);
-  light_inverse_area_[l] = surface.inverse_area;
+  light_inverse_area_[l] = surface.inverse_area, light_slack_[l] = surface.slack;
   light_radiance_.set(l, light.radiance);
   light_is_delta_[l] = false;
 }
@@ -146,15 +148,15 @@ void LambertianBlock::set_parallelogram(int l, const ParallelogramLight& light) 
 /// lights, whose results are unused.
 void LambertianBlock::sample_parallelograms() {
   for_each_lane([&](int l) {
-    const Vec3 at = light_origin_[l] + light_dp_du_[l] * u_light_x[l] + light_dp_dv_[l] * u_light_y[l];
+    const Vec3 at = light_origin_[l] + (light_dp_du_[l] * u_light_x[l] + light_dp_dv_[l] * u_light_y[l]);
     const Vec3 to = at - p[l];
     const float d2 = length_squared(to), inverse = 1 / std::sqrt(d2);
     const Vec3 wi = to * inverse;
     const float facing = dot(wi, light_n_[l]), cosine = std::abs(facing);
     const bool seen = d2 > 0 && facing < 0 && cosine > Shape::kGrazing;
     const float density = light_inverse_area_[l] * d2 / cosine;
-    light_wi_.set(l, wi);
-    light_distance_[l] = d2 * inverse;
+    light_wi_.set(l, wi), light_p_.set(l, at);
+    light_distance_[l] = d2 * inverse, light_offset_[l] = surface_offset(at, light_n_[l], light_slack_[l]);
     light_pdf_[l] = seen ? density : 0;
   });
 }
@@ -189,24 +191,29 @@ void LambertianBlock::sample_spheres() {
     const Ball ball{light_origin_[l], light_radius_[l], light_sign_[l]};
     const Vec3 from = p[l], wi = sphere_wi_[l];
     sphere_distance_[l] = ball.distance(from, wi);
-    light_n_.set(l, ball.outward(from, wi, sphere_distance_[l]) * ball.sign);
+    sphere_outward_.set(l, ball.outward(from, wi, sphere_distance_[l]));
   });
   for_each_lane([&](int l) {
     const bool taken = is_sphere_[l];
-    const Vec3 wi = sphere_wi_[l];
+    const Ball ball{light_origin_[l], light_radius_[l], light_sign_[l]};
+    const Vec3 wi = sphere_wi_[l], outward = sphere_outward_[l], at = ball.center + outward * ball.radius;
+    const Vec3 n = outward * ball.sign;
     const float density = warp::cone_pdf_solid_angle(one_minus_cos_max_[l]);
-    const float seen = dot(light_n_[l], wi) < 0 ? density : 0;
-    light_wi_.x[l] = taken ? wi.x : light_wi_.x[l], light_wi_.y[l] = taken ? wi.y : light_wi_.y[l];
-    light_wi_.z[l] = taken ? wi.z : light_wi_.z[l];
+    const float seen = dot(n, wi) < 0 ? density : 0;
+    const auto take = [&](Vectors& to, const Vec3& from) {
+      to.x[l] = taken ? from.x : to.x[l], to.y[l] = taken ? from.y : to.y[l], to.z[l] = taken ? from.z : to.z[l];
+    };
+    take(light_wi_, wi), take(light_p_, at), take(light_n_, n);
     light_distance_[l] = taken ? sphere_distance_[l] : light_distance_[l];
+    light_offset_[l] = taken ? surface_offset(at, n, ball.slack()) : light_offset_[l];
     light_pdf_[l] = taken ? seen : light_pdf_[l];
     is_open_[l] = taken ? 0 : is_open_[l];
   });
 }
 
 void LambertianBlock::set_light(int l, const EmitterSample& light) {
-  light_wi_.set(l, light.wi);
-  light_distance_[l] = light.distance, light_pdf_[l] = light.pdf_solid_angle;
+  light_wi_.set(l, light.wi), light_p_.set(l, light.p), light_n_.set(l, light.n);
+  light_distance_[l] = light.distance, light_offset_[l] = light.offset, light_pdf_[l] = light.pdf_solid_angle;
   light_radiance_.set(l, light.radiance);
   light_is_delta_[l] = light.is_delta;
 }
@@ -226,12 +233,12 @@ void LambertianBlock::connect(float pmf) {
 
     const Vec3 origin = offset_origin(p[l], ng_[l], offset_[l], wi);
     const bool infinite = light_distance_[l] == kInfinity;
-    const Vec3 to = p[l] + wi * light_distance_[l] - origin;
-    const float distance = length(to), inverse = 1 / distance;
+    const Vec3 target = offset_target(light_p_[l], light_n_[l], light_offset_[l], wi, light_distance_[l]);
+    const Ray ray = ray_between(origin, target);
     shadow_o.set(l, origin);
-    shadow_d.x[l] = infinite ? wi.x : to.x * inverse, shadow_d.y[l] = infinite ? wi.y : to.y * inverse;
-    shadow_d.z[l] = infinite ? wi.z : to.z * inverse;
-    shadow_t[l] = infinite ? kInfinity : distance * (1 - 10 * kRayEpsilon);
+    shadow_d.x[l] = infinite ? wi.x : ray.d.x, shadow_d.y[l] = infinite ? wi.y : ray.d.y;
+    shadow_d.z[l] = infinite ? wi.z : ray.d.z;
+    shadow_t[l] = infinite ? kInfinity : ray.t_max;
   });
 }
 

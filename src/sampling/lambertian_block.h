@@ -70,8 +70,8 @@ class LambertianBlock {
   void add(uint32_t index, const Spectrum& path_throughput, float eta, const Ray& ray, const RayHit& hit,
            const LambertianMesh& surface, const PathRandom& random, uint32_t address);
 
-  /// Computes what TriangleMesh::fill() and Scene::resolve() do, reflectances, and the side from which the path came.
-  void find_surfaces(const Scene& scene);
+  /// Computes what TriangleMesh::fill() does, reflectances, and the side from which the path came.
+  void find_surfaces();
   /// Draws the random numbers of all vertices.
   void draw_numbers();
   /// Samples a light for each vertex, for connect().
@@ -111,15 +111,15 @@ class LambertianBlock {
   int size_ = 0;
   bool drawn_ = false;             // the random numbers are already set, as points of sequences
   uint64_t keys_[kCapacity] = {};  // otherwise: keys of the vertices' random numbers
-  Vectors light_wi_;
-  Floats light_distance_, light_pdf_;  // pdf 0: no sample
+  Vectors light_wi_, light_p_, light_n_;
+  Floats light_distance_, light_offset_, light_pdf_;  // pdf 0: no sample
   Spectra light_radiance_;
   int32_t light_is_delta_[kCapacity] = {};
-  Vectors light_origin_, light_dp_du_, light_dp_dv_, light_n_;  // of parallelograms
-  Floats light_inverse_area_;
+  Vectors light_origin_, light_dp_du_, light_dp_dv_;  // of parallelograms
+  Floats light_inverse_area_, light_slack_;
   Floats light_radius_, light_sign_;  // of spheres, whose centre is light_origin_
   Floats cone_x_, cone_y_, one_minus_cos_, one_minus_cos_max_, sphere_distance_;
-  Vectors sphere_wi_;
+  Vectors sphere_wi_, sphere_outward_;
   // Whether it is such a light; whether there is no sample yet.
   int32_t is_sphere_[kCapacity] = {}, is_open_[kCapacity] = {};
   struct Corner {

@@ -47,13 +47,14 @@ class PowerLights {
   std::unordered_map<const Emitter*, float> pmfs_;
 };
 
-/// Ray from a surface to a light sample, ending just short of the light.
-inline Ray shadow_ray(const SurfaceHit& hit, const EmitterSample& light) {
-  const Vec3 o = offset_origin(hit, light.wi);
+/// Ray from `o` to a light sample, ending just short of the light.
+inline Ray shadow_ray(const Vec3& o, const EmitterSample& light) {
   if (light.distance == kInfinity) return {o, light.wi, kInfinity};
-  const Vec3 d = hit.p + light.wi * light.distance - o;
-  const float distance = length(d);
-  return {o, d * (1 / distance), distance * (1 - 10 * kRayEpsilon)};
+  return ray_between(o, offset_target(light.p, light.n, light.offset, light.wi, light.distance));
+}
+/// The same from a surface.
+inline Ray shadow_ray(const SurfaceHit& hit, const EmitterSample& light) {
+  return shadow_ray(offset_origin(hit, light.wi), light);
 }
 
 // Weights for choosing lights in proportion to their power. A light may become unlikely, never impossible.

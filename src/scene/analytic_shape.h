@@ -76,6 +76,7 @@ class Cylinder final : public AnalyticShape {
  private:
   Transform to_world_, to_local_;  // of the unit cylinder x^2 + y^2 = 1, z in [0, 1]
   float area_;
+  float slack_;  // of its points (core/rounding.h)
   float sign_;
 };
 

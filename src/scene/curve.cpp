@@ -41,8 +41,12 @@ CurveShape::CurveShape(CurveKind kind, std::vector<CurvePoint> points, std::vect
 
 CurveShape::Centre CurveShape::centre(uint32_t segment, float v) const {
   const CurvePoint* q = &points_[segments_[segment]];
-  const auto at = [&](int i) { return Vec3{q[i][0], q[i][1], q[i][2]}; };
-  if (kind_ == CurveKind::kLinear) return {at(0) * (1 - v) + at(1) * v, at(1) - at(0), {}, q[1][3] - q[0][3]};
+  const Vec3 origin{q[0][0], q[0][1], q[0][2]};
+  const auto at = [&](int i) { return Vec3{q[i][0], q[i][1], q[i][2]} - origin; };
+  if (kind_ == CurveKind::kLinear) {
+    const Vec3 along = at(1);
+    return {origin, along * v, along, {}, lerp(v, q[0][3], q[1][3]), q[1][3] - q[0][3], max_component(abs(along))};
+  }
   // Uniform cubic B-spline: weights of the four points, and their first and second derivatives.
   const float w = 1 - v, sixth = 1.0f / 6;
   const float b[4] = {sixth * w * w * w, sixth * (3 * v * v * v - 6 * v * v + 4),
@@ -50,11 +54,14 @@ CurveShape::Centre CurveShape::centre(uint32_t segment, float v) const {
   const float d[4] = {-0.5f * w * w, 0.5f * (3 * v * v - 4 * v), 0.5f * (-3 * v * v + 2 * v + 1), 0.5f * v * v};
   const float dd[4] = {w, 3 * v - 2, 1 - 3 * v, v};
   Centre result{};
+  result.origin = origin;
   for (int i = 0; i < 4; ++i) {
     result.c += at(i) * b[i];
     result.dc += at(i) * d[i];
     result.ddc += at(i) * dd[i];
+    result.r += q[i][3] * b[i];
     result.dr += q[i][3] * d[i];
+    result.reach = std::max(result.reach, max_component(abs(at(i))));
   }
   return result;
 }
@@ -62,13 +69,16 @@ CurveShape::Centre CurveShape::centre(uint32_t segment, float v) const {
 void CurveShape::fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const {
   const float v = hit.barycentric.x;
   const Centre m = centre(hit.primitive, v);
-  hit.p = ray.o + ray.d * hit.t;
-  const Vec3 rad = hit.p - m.c;
-  const float radius = length(rad), speed2 = length_squared(m.dc);
+  // The point at the distance found by Embree, moved onto the tube.
+  const Vec3 found = (ray.o - m.origin) + ray.d * hit.t - m.c;
+  const float away = length(found), radius = m.r, speed2 = length_squared(m.dc);
+  const Vec3 rad = away > 0 ? found * (radius / away) : Vec3{};
+  hit.p = m.origin + (m.c + rad);
   Vec3 n = rad;
   if (kind_ == CurveKind::kBspline) n = rad * (speed2 - dot(rad, m.ddc)) - m.dc * (m.dr * radius);
   const float l = length(n);
   hit.ng = l > 0 ? n * (1 / l) : -normalize(ray.d);
+  hit.offset = surface_offset(hit.p, hit.ng, 8 * (m.reach + radius));
   const Vec3 tangent = speed2 > 0 ? m.dc * (1 / std::sqrt(speed2)) : Vec3{0, 0, 1};
   const auto [rotated, radial] = axes_across(tangent);
   float angle = std::atan2(dot(rotated, rad), dot(radial, rad)) * kInvPi * 0.5f;

@@ -36,8 +36,9 @@ class CurveShape final : public Shape {
  private:
   /// Centre line and radius at parameter v of a segment, with derivatives by v.
   struct Centre {
-    Vec3 c, dc, ddc;
-    float dr;  // of the radius
+    Vec3 origin, c, dc, ddc;  // c relative to the first control point
+    float r, dr;
+    float reach;  // largest coordinate of control points relative to the first
   };
   Centre centre(uint32_t segment, float v) const;
 

@@ -40,6 +40,7 @@ Cylinder::Cylinder(const Transform& to_world, bool flip_normals)
         ErrorCode::kInput,
         "the to_world transformation of a cylinder must keep its cross section a circle at right angles to the axis");
   area_ = kTwoPi * r * length(z);
+  slack_ = 8 * r;  // roundings of rays and points to floats in the space of the unit cylinder
 }
 
 Bounds3 Cylinder::bounds() const { return to_world_.bounds({{-1, -1, 0}, {1, 1, 1}}); }
@@ -60,11 +61,12 @@ float Cylinder::intersect(const Ray& ray) const {
 }
 
 void Cylinder::fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const {
-  Vec3 local = to_local_.point(ray.at(hit.t));
+  Vec3 local = to_local_.point(ray.o) + to_local_.vector(ray.d) * hit.t;
   const float inverse_r = 1 / std::sqrt(local.x * local.x + local.y * local.y);
   local.x *= inverse_r, local.y *= inverse_r;
   hit.p = to_world_.point(local);
   hit.ng = normalize(to_world_.normal({local.x, local.y, 0})) * sign_;
+  hit.offset = surface_offset(hit.p, hit.ng, slack_);
   hit.uv = {angle_turns(local.y, local.x), local.z};
   if (!with_derivatives) {
     hit.frame = Frame(hit.ng);
@@ -81,7 +83,7 @@ std::shared_ptr<Shape> Cylinder::transformed(const Transform& to_world) const {
 
 AreaSample Cylinder::sample_area(Vec2 u, float /*u_primitive*/) const {
   const float phi = kTwoPi * u.x, c = std::cos(phi), s = std::sin(phi);
-  return {to_world_.point({c, s, u.y}), normalize(to_world_.normal({c, s, 0})) * sign_, u, 1 / area_};
+  return {to_world_.point({c, s, u.y}), normalize(to_world_.normal({c, s, 0})) * sign_, u, 1 / area_, 0, {}, slack_};
 }
 
 }  // namespace covary

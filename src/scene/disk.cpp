@@ -22,10 +22,11 @@ float Disk::intersect(const Ray& ray) const {
 }
 
 void Disk::fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const {
-  Vec3 local = to_local_.point(ray.at(hit.t));
+  Vec3 local = to_local_.point(ray.o) + to_local_.vector(ray.d) * hit.t;
   local.z = 0;
   hit.p = to_world_.point(local);
   hit.ng = normal_;
+  hit.offset = surface_offset(hit.p, hit.ng, 0);  // the point is transformed in double precision, as rays are
   const float r = std::sqrt(local.x * local.x + local.y * local.y);
   hit.uv = {r, angle_turns(local.y, local.x)};
   if (!with_derivatives) {

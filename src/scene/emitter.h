@@ -22,6 +22,7 @@ struct EmitterSample {
   float distance = kInfinity;  ///< to the light; infinite for environments and directional lights
   Vec3 p, n;                   ///< point and unit geometric normal on the light (unset when infinitely far)
   Vec2 uv;                     ///< surface parameters of p (area lights)
+  float offset = 0;            ///< as SurfaceHit::offset; 0: not on a surface
   /// Emitted towards the reference point; for delta lights, the irradiance on a surface facing wi, already divided by
   /// the squared distance.
   Spectrum radiance;
@@ -35,6 +36,7 @@ struct EmissionSample {
   Ray ray;            ///< leaves the light
   Vec3 n;             ///< unit geometric normal at the origin; the direction itself for point-like and infinite lights
   Vec2 uv;            ///< surface parameters of the origin (area lights)
+  float offset = 0;   ///< as SurfaceHit::offset, of the origin; 0: not on a surface
   Spectrum radiance;  ///< emitted radiance (area, environment) or intensity (point-like)
   /// Per unit area; for infinite lights per unit area of the disk perpendicular to the ray; 1 if delta.
   float pdf_position = 0;

@@ -99,12 +99,14 @@ Parallelogram TriangleMesh::find_parallelogram() const {
   const Vec3 other = cross(vertices_[s[1]].p - vertices_[s[0]].p, vertices_[s[2]].p - vertices_[s[0]].p);
   if (!(dot(other, result.n) > 0)) return {};
   result.inverse_area = 1 / length(cross(result.dp_du, result.dp_dv));
+  const Vec3 reach = abs(result.dp_du) + abs(result.dp_dv);
+  result.slack = plane_slack(reach, result.dp_du, result.dp_dv, result.inverse_area);
   return result;
 }
 
 AreaSample TriangleMesh::sample_uv(Vec2 uv) const {
   const Parallelogram& q = parallelogram_;
-  AreaSample at = {q.origin + q.dp_du * uv.x + q.dp_dv * uv.y, q.n, uv, q.inverse_area};
+  AreaSample at = {q.origin + (q.dp_du * uv.x + q.dp_dv * uv.y), q.n, uv, q.inverse_area, 0, {}, q.slack};
   if (TriangleMesh::has_attributes() && is_parallelogram()) find_triangle(at);
   return at;
 }
@@ -128,9 +130,10 @@ void TriangleMesh::prepare_sampling() {
   for (const auto& t : triangles_) {
     const Vertex &v0 = vertices_[t[0]], &v1 = vertices_[t[1]], &v2 = vertices_[t[2]];
     const Vec3 e1 = v1.p - v0.p, e2 = v2.p - v0.p, normal = cross(e1, e2);
+    const float inverse = 1 / length(normal);
     // Without texture coordinates, the surface parameters are the barycentric coordinates.
-    facets_.push_back({v0.p, e1, e2, normalize(normal), v0.uv, has_uvs_ ? v1.uv - v0.uv : Vec2{1, 0},
-                       has_uvs_ ? v2.uv - v0.uv : Vec2{0, 1}});
+    facets_.push_back({v0.p, e1, e2, normal * inverse, v0.uv, has_uvs_ ? v1.uv - v0.uv : Vec2{1, 0},
+                       has_uvs_ ? v2.uv - v0.uv : Vec2{0, 1}, plane_slack(abs(e1) + abs(e2), e1, e2, inverse)});
     areas.push_back(0.5f * length(normal));
   }
   areas_ = Discrete(areas);
@@ -142,8 +145,12 @@ void TriangleMesh::fill(const Ray& /*ray*/, SurfaceHit& hit, bool with_derivativ
   const Vertex &v0 = vertices_[t[0]], &v1 = vertices_[t[1]], &v2 = vertices_[t[2]];
   const float b1 = hit.barycentric.x, b2 = hit.barycentric.y, b0 = 1 - b1 - b2;
   const Vec3 e1 = v1.p - v0.p, e2 = v2.p - v0.p;
-  hit.p = v0.p * b0 + v1.p * b1 + v2.p * b2;
-  hit.ng = normalize(cross(e1, e2));
+  const Vec3 normal = cross(e1, e2);
+  const float inverse = 1 / length(normal), margin = edge_margin(v0.p, e1, e2, inverse);
+  const Vec3 d1 = e1 * lerp(margin, b1, 1.0f / 3), d2 = e2 * lerp(margin, b2, 1.0f / 3);
+  hit.p = v0.p + (d1 + d2);
+  hit.ng = normal * inverse;
+  hit.offset = surface_offset(hit.p, hit.ng, plane_slack(abs(d1) + abs(d2), e1, e2, inverse));
   Vec3 n = hit.ng;
   if (has_normals_) {
     const Vec3 interpolated = v0.n * b0 + v1.n * b1 + v2.n * b2;
@@ -157,11 +164,11 @@ void TriangleMesh::fill(const Ray& /*ray*/, SurfaceHit& hit, bool with_derivativ
   }
   hit.dp_du = e1, hit.dp_dv = e2;
   if (has_uvs_) {
-    const Vec2 d1 = v1.uv - v0.uv, d2 = v2.uv - v0.uv;
-    const float determinant = d1.x * d2.y - d1.y * d2.x;
-    const float inverse = determinant != 0 ? 1 / determinant : 0;
-    hit.dp_du = (e1 * d2.y - e2 * d1.y) * inverse;
-    hit.dp_dv = (e2 * d1.x - e1 * d2.x) * inverse;
+    const Vec2 uv1 = v1.uv - v0.uv, uv2 = v2.uv - v0.uv;
+    const float determinant = uv1.x * uv2.y - uv1.y * uv2.x;
+    const float scale = determinant != 0 ? 1 / determinant : 0;
+    hit.dp_du = (e1 * uv2.y - e2 * uv1.y) * scale;
+    hit.dp_dv = (e2 * uv1.x - e1 * uv2.x) * scale;
   }
   make_in_place(hit.frame, [&] { return Frame::from_tangent(n, hit.dp_du); });
 }
@@ -172,7 +179,7 @@ AreaSample TriangleMesh::sample_area(Vec2 u, float u_primitive) const {
   const uint32_t triangle = areas_.sample(u_primitive).index;
   const Facet& facet = facets_[triangle];
   const Vec2 b = warp::square_to_triangle(u);
-  return {facet.point(b), facet.n, facet.uv_at(b), inverse_area_, triangle, b};
+  return {facet.point(b), facet.n, facet.uv_at(b), inverse_area_, triangle, b, facet.slack};
 }
 
 float TriangleMesh::part_area(uint32_t part) const {
@@ -183,7 +190,7 @@ AreaSample TriangleMesh::sample_part(uint32_t part, Vec2 u) const {
   if (is_parallelogram()) return TriangleMesh::sample_uv(u);
   const Facet& facet = facets_[part];
   const Vec2 b = warp::square_to_triangle(u);
-  return {facet.point(b), facet.n, facet.uv_at(b), 1 / part_area(part), part, b};
+  return {facet.point(b), facet.n, facet.uv_at(b), 1 / part_area(part), part, b, facet.slack};
 }
 
 Bounds3 TriangleMesh::part_bounds(uint32_t part) const {

@@ -93,7 +93,8 @@ class TriangleMesh final : public Shape {
   struct Facet {
     Vec3 p, e1, e2, n;  // point = p + b1 e1 + b2 e2
     Vec2 uv, duv1, duv2;
-    Vec3 point(Vec2 b) const { return p + e1 * b.x + e2 * b.y; }
+    float slack;
+    Vec3 point(Vec2 b) const { return p + (e1 * b.x + e2 * b.y); }
     Vec2 uv_at(Vec2 b) const { return uv + duv1 * b.x + duv2 * b.y; }
   };
   std::vector<Facet> facets_;  // one per triangle after prepare_sampling()

@@ -32,7 +32,8 @@ Ray to_ray(RTCRayN* ray, unsigned n, unsigned i) {
 }
 
 void analytic_bounds(const RTCBoundsFunctionArguments* args) {
-  const Bounds3 b = static_cast<const AnalyticShape*>(args->geometryUserPtr)->bounds();
+  Bounds3 b = static_cast<const AnalyticShape*>(args->geometryUserPtr)->bounds();
+  b.lower += abs(b.lower) * (-4 * kRounding), b.upper += abs(b.upper) * (4 * kRounding);  // they are rounded
   *args->bounds_o = {b.lower.x, b.lower.y, b.lower.z, 0, b.upper.x, b.upper.y, b.upper.z, 0};
 }
 
@@ -113,6 +114,14 @@ void set_shape(RTCGeometry geometry, const Shape& shape) {
   rtcCommitGeometry(geometry);
 }
 
+/// The transformation as Embree has it, in floats.
+Transform rounded(const Transform& to_world) {
+  Matrix4 m = to_world.matrix();
+  for (auto& row : m)
+    for (double& x : row) x = static_cast<float>(x);
+  return Transform(m);
+}
+
 void set_placement(RTCGeometry geometry, const Transform& to_world) {
   float columns[12];
   for (int c = 0; c < 4; ++c)
@@ -173,10 +182,27 @@ class Query {
 #endif
 };
 
+/// Bound of errors along each axis, in units of kRounding, when Embree transforms rays from world space: it computes in
+/// floats, with an inverse that it computes in floats, too.
+Vec3 slack_of(const Transform& to_world, const Bounds3& world) {
+  const Matrix4 m = to_world.matrix(), inverse = to_world.inverse().matrix();
+  Vec3 slack;
+  for (int k = 0; k < 3; ++k) {
+    const double t = m[k][3], far = std::max(std::abs(world.lower[k] - t), std::abs(world.upper[k] - t));
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        slack[i] += static_cast<float>(4 * std::abs(m[i][j] * inverse[j][k]) * (std::abs(t) + far));
+  }
+  return slack;
+}
+
 /// Transforms a hit in a group's space to world space.
-void place(SurfaceHit& hit, const Transform& to_world, bool with_derivatives) {
+void place(SurfaceHit& hit, const Transform& to_world, const Vec3& slack, bool with_derivatives) {
   hit.p = to_world.point(hit.p);
-  hit.ng = normalize(to_world.normal(hit.ng));
+  const Vec3 normal = to_world.normal(hit.ng);
+  const float inverse = 1 / length(normal);  // by this, distances along the normal grow
+  hit.ng = normal * inverse;
+  hit.offset = hit.offset * inverse + surface_offset(hit.p, hit.ng, dot(slack, abs(hit.ng)));
   const Vec3 n = normalize(to_world.normal(hit.frame.n));
   if (!with_derivatives) {
     hit.frame = Frame(n);
@@ -241,13 +267,19 @@ RayTracer::RayTracer(std::span<const ShapePtr> shapes, std::span<const Instance>
       set_placement(geometry, instance.to_world);
       rtcAttachGeometryByID(top_.scene, geometry, static_cast<unsigned>(top_.shapes.size() + placed_.size()));
       rtcReleaseGeometry(geometry);
-      placed_.push_back({&group, instance.to_world});
+      placed_.push_back(placed_at(group, instance.to_world));
     }
     commit_scene(top_.scene);
   } catch (...) {  // out of memory
     release(device_, top_.scene, groups_);
     throw;
   }
+}
+
+RayTracer::Placed RayTracer::placed_at(const Group& group, const Transform& to_world) {
+  Bounds3 bounds;
+  for (const Shape* shape : group.shapes) bounds.extend(to_world.bounds(shape->bounds()));
+  return {&group, rounded(to_world), slack_of(to_world, bounds)};
 }
 
 RayTracer::~RayTracer() { release(device_, top_.scene, groups_); }
@@ -260,7 +292,7 @@ void RayTracer::move_shape(size_t index, const Shape& shape) {
 
 void RayTracer::move_instance(size_t index, const Transform& to_world) {
   set_placement(rtcGetGeometry(top_.scene, static_cast<unsigned>(top_.shapes.size() + index)), to_world);
-  placed_[index].to_world = to_world;
+  placed_[index] = placed_at(*placed_[index].group, to_world);
 }
 
 void RayTracer::commit() { commit_scene(top_.scene); }
@@ -323,7 +355,7 @@ void RayTracer::resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) co
   } else {
     const Transform to_local = placed->to_world.inverse();
     shape->fill({to_local.point(ray.o), to_local.vector(ray.d), ray.t_max}, hit, with_derivatives);
-    place(hit, placed->to_world, with_derivatives);
+    place(hit, placed->to_world, placed->slack, with_derivatives);
   }
 }
 

@@ -43,15 +43,17 @@ class RayTracer {
   const TriangleMesh* mesh_of(const RayHit& hit) const {
     return hit.found() && hit.instance == RayHit::kNone ? top_.meshes[hit.geometry] : nullptr;
   }
+  struct Placed {
+    const Group* group;
+    Transform to_world;
+    Vec3 slack;  // errors of Embree's transformation of rays to the group's space (core/rounding.h)
+  };
   Group make_group(std::span<const ShapePtr> shapes, bool moves = false) const;
+  static Placed placed_at(const Group& group, const Transform& to_world);
 
   RTCDeviceTy* device_ = nullptr;
   Group top_;  // shapes, then instances
   std::vector<Group> groups_;
-  struct Placed {
-    const Group* group;
-    Transform to_world;
-  };
   std::vector<Placed> placed_;  // by geometry id in top_ minus top_.shapes.size()
 };
 

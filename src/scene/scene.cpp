@@ -39,7 +39,6 @@ void Scene::measure() {
       n_triangles_ += dynamic_cast<const TriangleMesh*>(shape.get()) ? shape->n_primitives() : 0;
     }
   if (bounds_.empty()) bounds_ = {{-1, -1, -1}, {1, 1, 1}};  // lights at infinity still need a bounding sphere
-  offset_unit_ = std::min(1.0f, std::max(max_component(abs(bounds_.lower)), max_component(abs(bounds_.upper))));
 }
 
 void Scene::place_lights() {
@@ -95,10 +94,7 @@ bool Scene::intersect(const Ray& ray, SurfaceHit& hit) const {
 void Scene::nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool coherent) const {
   tracer_->nearest(rays, hits, coherent);
 }
-void Scene::resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) const {
-  tracer_->resolve(ray, found, hit);
-  hit.offset = ray_offset(hit.p);
-}
+void Scene::resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) const { tracer_->resolve(ray, found, hit); }
 bool Scene::occluded(const Ray& ray) const {
   uint8_t blocked = 0;
   tracer_->occluded({&ray, 1}, {&blocked, 1});

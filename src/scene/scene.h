@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/keyed_transform.h"
+#include "core/rounding.h"
 #include "core/transform.h"
 #include "scene/camera.h"
 #include "scene/emitter.h"
@@ -68,9 +69,6 @@ struct RayHit {
   bool found() const { return geometry != kNone; }
 };
 
-/// Offset of ray origins against self-intersection, relative to the magnitude of coordinates.
-inline constexpr float kRayEpsilon = 1500 * 0x1p-24f;
-
 class Scene {
  public:
   /// Builds the acceleration structure.
@@ -105,6 +103,8 @@ class Scene {
     return movements_[found.instance == RayHit::kNone ? found.geometry : found.instance];
   }
 
+  std::span<const ShapePtr> shapes() const { return parts_.shapes; }
+  std::span<const Instance> instances() const { return parts_.instances; }
   const Camera& camera() const { return *parts_.camera; }
   std::span<const std::shared_ptr<const Emitter>> emitters() const { return parts_.emitters; }
   /// The light at infinity that rays leaving the scene hit, or null.
@@ -114,8 +114,6 @@ class Scene {
   const std::string& first_medium() const { return parts_.first_medium; }
   const Medium* camera_medium() const { return parts_.camera_medium.get(); }
   const Bounds3& bounds() const { return bounds_; }
-  /// Offset from a surface at `p` of the origins of rays leaving it, against self-intersection.
-  float ray_offset(const Vec3& p) const { return (offset_unit_ + max_component(abs(p))) * kRayEpsilon; }
   size_t n_triangles() const { return n_triangles_; }
   size_t n_shapes() const { return parts_.shapes.size(); }
   double build_seconds() const { return build_seconds_; }
@@ -130,15 +128,11 @@ class Scene {
   std::vector<int> movements_;  // of shapes, then of instances: an index into parts_.movements, or -1
   const Emitter* environment_ = nullptr;
   Bounds3 bounds_;
-  float offset_unit_ = 1;  // largest coordinate of the scene, at most 1
   size_t n_triangles_ = 0;
   double build_seconds_ = 0;
 };
 
-/// `p`, on a surface with geometric normal `ng`, moved by `offset` to the side of the surface that `w` points to.
-inline Vec3 offset_origin(const Vec3& p, const Vec3& ng, float offset, const Vec3& w) {
-  return p + ng * std::copysign(offset, dot(ng, w));
-}
+/// Origin of a ray that leaves the surface in direction `w`.
 inline Vec3 offset_origin(const SurfaceHit& hit, const Vec3& w) { return offset_origin(hit.p, hit.ng, hit.offset, w); }
 
 }  // namespace covary

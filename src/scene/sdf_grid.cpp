@@ -85,6 +85,8 @@ SdfGrid::SdfGrid(const Transform& to_world, SdfValues grid, bool smooth, bool fl
         local_bounds_.extend(Vec3{fx / cells_.x, fy / cells_.y, fz / cells_.z});
         local_bounds_.extend(Vec3{(fx + 1) / cells_.x, (fy + 1) / cells_.y, (fz + 1) / cells_.z});
       }
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) size_[i] += static_cast<float>(std::abs(to_world_.matrix()[i][j]));
   if (local_bounds_.empty())
     throw Error(ErrorCode::kInput, "the signed distances have one sign throughout: there is no surface");
 }
@@ -196,10 +198,13 @@ Vec3 SdfGrid::smooth_normal(const Vec3& p) const {
 }
 
 void SdfGrid::fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const {
-  hit.p = ray.at(hit.t);
-  const Vec3 p = to_cells(to_local_.point(hit.p));
+  Vec3 p = to_cells(to_local_.point(ray.o) + to_local_.vector(ray.d) * hit.t);
   int cell[3];
   for (int axis = 0; axis < 3; ++axis) cell[axis] = std::clamp(static_cast<int>(p[axis]), 0, grid_.size[axis] - 2);
+  const Vec3 slope = gradient(p, cell) * Vec3{1 / cells_.x, 1 / cells_.y, 1 / cells_.z};
+  const float steepness = length_squared(slope);  // the distance found is a float: one step of Newton's method
+  if (steepness > 0) p += slope * std::clamp(-value(p) / steepness, -0.5f, 0.5f);
+  hit.p = to_world_.point({p.x / cells_.x, p.y / cells_.y, p.z / cells_.z});
   const float sign = flipped_ ? -1.0f : 1.0f;
   const auto to_normal = [&](const Vec3& local, const Vec3& otherwise) {
     const Vec3 n = to_world_.normal(local);
@@ -207,6 +212,7 @@ void SdfGrid::fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const
     return l > 0 ? n * (sign / l) : otherwise;
   };
   hit.ng = to_normal(gradient(p, cell), -normalize(ray.d));
+  hit.offset = surface_offset(hit.p, hit.ng, 8 * dot(abs(hit.ng), size_));
   const Vec3 n = smooth_ ? to_normal(smooth_normal(p), hit.ng) : hit.ng;
   hit.uv = {0, 0};
   hit.frame = Frame(n);

@@ -44,6 +44,7 @@ class SdfGrid final : public AnalyticShape {
   Vec3 to_cells(const Vec3& local) const { return {local.x * cells_.x, local.y * cells_.y, local.z * cells_.z}; }
 
   Transform to_world_, to_local_;
+  Vec3 size_;  // in the world, along each axis
   SdfValues grid_;
   Vec3 cells_;  // numbers of cells
   Bounds3 local_bounds_;

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "core/ray.h"
+#include "core/rounding.h"
 #include "core/transform.h"
 #include "scene/bsdf.h"
 #include "scene/emitter.h"
@@ -22,12 +23,13 @@ struct AreaSample {
   float pdf_area = 0;      ///< per unit area
   uint32_t primitive = 0;  ///< triangle index within a mesh
   Vec2 barycentric;        ///< weights of the triangle's 2nd and 3rd vertex
+  float slack = 0;         ///< bound of errors of p (core/rounding.h)
 };
 
 class Shape : public SceneObject {
  public:
   virtual Bounds3 bounds() const = 0;
-  /// Completes a hit on this shape: p, ng, frame and uv (and dp_du, dp_dv, with the frame aligned to dp_du, if
+  /// Completes a hit on this shape: p, ng, offset, frame and uv (and dp_du, dp_dv, with the frame aligned to dp_du, if
   /// `with_derivatives`) from the t, primitive and barycentric set by the ray tracer.
   virtual void fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const = 0;
   virtual float area() const = 0;
@@ -63,6 +65,7 @@ class Shape : public SceneObject {
     sample.distance = d2 * inverse;
     sample.wi = d * inverse;
     sample.p = area.p, sample.n = area.n, sample.uv = area.uv;
+    sample.offset = surface_offset(area.p, area.n, area.slack);
     const float cosine = std::abs(dot(sample.wi, area.n));
     sample.pdf_solid_angle = cosine > kGrazing ? area.pdf_area * d2 / cosine : 0;
     return sample;

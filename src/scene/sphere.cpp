@@ -56,9 +56,10 @@ float Sphere::intersect(const Ray& ray) const {
 }
 
 void Sphere::fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const {
-  const Vec3 outward = normalize(ray.at(hit.t) - center_);
+  const Vec3 outward = normalize((ray.o - center_) + ray.d * hit.t);
   hit.p = center_ + outward * radius_;
   hit.ng = outward * sign_;
+  hit.offset = surface_offset(hit.p, hit.ng, ball().slack());
   const Vec3 local = to_local(outward);
   const float rho = std::sqrt(local.x * local.x + local.y * local.y);
   hit.uv = spherical_uv(local);
@@ -80,7 +81,7 @@ std::shared_ptr<Shape> Sphere::transformed(const Transform& to_world) const {
 
 AreaSample Sphere::sample_area(Vec2 u, float /*u_primitive*/) const {
   const Vec3 d = warp::square_to_sphere(u);
-  return {center_ + d * radius_, d * sign_, spherical_uv(to_local(d)), 1 / area()};
+  return {center_ + d * radius_, d * sign_, spherical_uv(to_local(d)), 1 / area(), 0, {}, ball().slack()};
 }
 
 EmitterSample Sphere::sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const {
@@ -94,6 +95,7 @@ EmitterSample Sphere::sample_towards(const Vec3& reference, Vec2 u, float u_prim
   const Vec3 outward = seen.outward(reference, sample.wi, sample.distance);
   sample.p = center_ + outward * radius_;
   sample.n = outward * sign_;
+  sample.offset = surface_offset(sample.p, sample.n, seen.slack());
   // Not needed for constant emission, in which case the light's power is known.
   if (!emitter() || !emitter()->knows_power()) sample.uv = spherical_uv(to_local(outward));
   sample.pdf_solid_angle = warp::cone_pdf_solid_angle(one_minus_cos_max);

@@ -23,7 +23,7 @@ struct SurfaceHit {
   const Shape* shape = nullptr;
   const Bsdf* bsdf = nullptr;        ///< never null for a hit
   uint32_t bsdf_flags = 0;           ///< of bsdf
-  float offset = 0;                  ///< offset from the surface of the origins of rays leaving it
+  float offset = 0;                  ///< of the origins of rays leaving it, along ng (core/rounding.h)
   const Emitter* emitter = nullptr;  ///< area light of this surface, or null
   uint32_t primitive = 0;            ///< triangle index within a mesh
   Vec2 barycentric;                  ///< weights of the triangle's 2nd and 3rd vertex

@@ -154,8 +154,7 @@ class Sampler {
     origin.to_light = -from.ray.d;
     Path path = {origin};
     Ray ray = {from.ray.o, from.ray.d, kInfinity};
-    if (!emitter.is_delta() && !emitter.is_infinite())
-      ray.o = offset_origin(ray.o, from.n, scene_.ray_offset(ray.o), ray.d);
+    ray.o = offset_origin(ray.o, from.n, from.offset, ray.d);
     uint32_t n_smooth = 0;
     for (uint32_t depth = 0; static_cast<int>(depth) + 1 < settings_.max_depth; ++depth) {
       Vertex v;
@@ -220,9 +219,8 @@ class Sampler {
     const SurfaceHit &a = camera[i].hit, &b = light[j].hit;
     if (!(b.bsdf_flags & kSmooth)) return {};
     const Vec3 w = normalize(b.p - a.p);
-    const Vec3 o = offset_origin(a.p, a.ng, scene_.ray_offset(a.p), w);
-    const Vec3 target = offset_origin(b.p, b.ng, scene_.ray_offset(b.p), -w);
-    if (scene_.occluded({o, normalize(target - o), length(target - o) * (1 - kRayEpsilon)})) return {};
+    const Vec3 target = offset_target(b.p, b.ng, b.offset, w, length(b.p - a.p));
+    if (scene_.occluded(ray_between(offset_origin(a, w), target))) return {};
     Path path(light.begin(), light.begin() + static_cast<long>(j) + 1);
     path[j].event.reset();
     append_reversed(path, camera, i);

@@ -80,10 +80,10 @@ class LightTracer final : public LightTracingIntegrator {
     const float cosine = e.delta_position ? 1 : dot(e.n, e.ray.d);
     Spectrum throughput = e.radiance * (static_cast<float>(emitters.size()) / e.pdf_position);
     if (!e.delta_position)
-      add(join, 0, 1, e.ray.o, e.n, throughput, [&](const Vec3& wi) { return std::max(0.0f, dot(e.n, wi)); });
+      add(join, 0, 1, e.ray.o, e.n, e.offset, throughput, [&](const Vec3& wi) { return std::max(0.0f, dot(e.n, wi)); });
     throughput *= cosine / e.pdf_direction;
     Ray ray = e.ray;
-    if (!e.delta_position) ray.o = offset_origin(ray.o, e.n, join.scene.ray_offset(ray.o), ray.d);
+    ray.o = offset_origin(ray.o, e.n, e.offset, ray.d);
     SurfaceHit hit;
     for (int edges = 1; edges + 1 <= longest_; ++edges) {
       ++join.context.n_rays;
@@ -92,7 +92,7 @@ class LightTracer final : public LightTracingIntegrator {
       const Vec3 wo = hit.frame.to_local(-ray.d), ng = hit.frame.to_local(hit.ng), ns{0, 0, 1};
       const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kImportance, join.context.arena);
       const auto vertex = static_cast<uint32_t>(edges);
-      add(join, vertex, edges + 1, hit.p, hit.ng, throughput, [&](const Vec3& wi_world) {
+      add(join, vertex, edges + 1, hit.p, hit.ng, hit.offset, throughput, [&](const Vec3& wi_world) {
         const Vec3 wi = hit.frame.to_local(wi_world);
         return bsdf->eval(wo, wi).value * shading_normal_factor(wo, wi, ns, ng, TransportMode::kImportance);
       });
@@ -107,8 +107,8 @@ class LightTracer final : public LightTracingIntegrator {
 
   /// Connects a vertex to the lens; `f` is called with the direction to it.
   template <typename F>
-  void add(const Join& join, uint32_t vertex, int edges, const Vec3& p, const Vec3& ng, const Spectrum& throughput,
-           const F& f) const {
+  void add(const Join& join, uint32_t vertex, int edges, const Vec3& p, const Vec3& ng, float offset,
+           const Spectrum& throughput, const F& f) const {
     if (edges > longest_) return;
     const LensSample lens = join.scene.camera().sample_towards(p, join.random.get_2d(vertex, Event::kLens));
     if (!(lens.pdf_solid_angle > 0 && lens.importance > 0)) return;
@@ -116,7 +116,7 @@ class LightTracer final : public LightTracingIntegrator {
     if (pixel.weight == 0) return;
     const Spectrum value = throughput * f(lens.wi) * (share_ * pixel.weight * lens.importance / lens.pdf_solid_angle);
     if (is_black(value)) return;
-    const Vec3 o = offset_origin(p, ng, join.scene.ray_offset(p), lens.wi);
+    const Vec3 o = offset_origin(p, ng, offset, lens.wi);
     const Vec3 d = lens.near_p - o;
     const float distance = length(d);
     ++join.context.n_rays;

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/thin_shapes.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <set>
+
+#include "scene/mesh.h"
+
+namespace covary {
+namespace {
+
+constexpr float kFarInDiameters = 32;
+constexpr size_t kMostShapes = 4096, kMostNamed = 3;
+constexpr uint32_t kPoints = 6;  // probed per shape
+
+struct SurfacePoint {
+  Vec3 p, n;
+};
+
+/// The spacing of floats at the point's largest coordinate.
+float spacing_at(const Vec3& p) {
+  const float largest = max_component(abs(p));
+  return std::nextafter(largest, kInfinity) - largest;
+}
+
+/// Point `i` of kPoints on a shape in its own space; none if it is a curve or a signed-distance grid, which have no
+/// thin parts that rays leave and meet again.
+std::optional<SurfacePoint> point_on(const Shape& shape, uint32_t i) {
+  if (const auto* mesh = dynamic_cast<const TriangleMesh*>(&shape)) {
+    const size_t n = mesh->triangles().size();
+    if (n == 0) return {};
+    const auto& t = mesh->triangles()[n * i / kPoints];
+    const Vec3 a = mesh->vertices()[t[0]].p, e1 = mesh->vertices()[t[1]].p - a, e2 = mesh->vertices()[t[2]].p - a;
+    return SurfacePoint{a + (e1 + e2) * (1.0f / 3), normalize(cross(e1, e2))};
+  }
+  if (!shape.can_emit()) return {};  // sample_area() is for lights
+  const float u = (static_cast<float>(i) + 0.5f) / kPoints;
+  const AreaSample at = shape.sample_area({u, std::fmod(u * 3.7f, 1.0f)}, u);
+  return SurfacePoint{at.p, at.n};
+}
+
+/// Distance from a point on `shape` to its nearest surface along `w`, the normal or its opposite; infinity if that is
+/// at least `most` or belongs to another shape.
+float thickness(const Scene& scene, const Shape& shape, const SurfacePoint& at, const Vec3& w, float most) {
+  const float step = spacing_at(at.p);
+  Ray ray{at.p - w * (4 * step), w, most + 8 * step};
+  SurfaceHit hit;
+  float first = kInfinity;
+  for (int i = 0; i < 2 + static_cast<int>(kFewestSpacings) && scene.intersect(ray, hit); ++i) {
+    const float along = dot(hit.p - at.p, w);
+    if (first == kInfinity)
+      first = along;
+    else if (along > first + step)
+      return hit.shape == &shape ? along - first : kInfinity;
+    ray.o = hit.p + w * step;
+    ray.t_max = most - along;
+    if (!(ray.t_max > 0)) break;
+  }
+  return kInfinity;
+}
+
+class Search {
+ public:
+  Search(const Scene& scene, const std::function<std::string(const Shape&)>& name_of,
+         std::vector<std::string>& warnings)
+      : scene_(scene), name_of_(name_of), warnings_(warnings) {}
+
+  void probe(const Shape& shape, const Transform& to_world) {
+    const Bounds3 bounds = to_world.bounds(shape.bounds());
+    if (!(max_component(abs(bounds.center())) > kFarInDiameters * bounds.radius()) || named_.contains(&shape)) return;
+    for (uint32_t i = 0; i < kPoints; ++i) {
+      const std::optional<SurfacePoint> local = point_on(shape, i);
+      if (!local) return;
+      const SurfacePoint at{to_world.point(local->p), normalize(to_world.normal(local->n))};
+      const float spacing = spacing_at(at.p), most = kFewestSpacings * spacing;
+      const float found = std::min(thickness(scene_, shape, at, at.n, most), thickness(scene_, shape, at, -at.n, most));
+      if (!(found < most)) continue;
+      named_.insert(&shape);
+      if (named_.size() <= kMostNamed)
+        warnings_.push_back(
+            fmt::format("{} is {:.2g} thick at ({:.7g}, {:.7g}, {:.7g}), where floats are {:.2g} apart: light that "
+                        "passes it may be wrong; expected at least {:.2g}, or a place nearer to the origin",
+                        name_of_(shape), found, at.p.x, at.p.y, at.p.z, spacing, most));
+      return;
+    }
+  }
+
+  void finish() {
+    if (named_.size() > kMostNamed)
+      warnings_.push_back(fmt::format("{} more shapes are as thin for where they stand", named_.size() - kMostNamed));
+  }
+
+ private:
+  const Scene& scene_;
+  const std::function<std::string(const Shape&)>& name_of_;
+  std::set<const Shape*> named_;
+  std::vector<std::string>& warnings_;
+};
+
+}  // namespace
+
+void warn_of_thin_shapes(const Scene& scene, const std::function<std::string(const Shape&)>& name_of,
+                         std::vector<std::string>& warnings) {
+  Search search(scene, name_of, warnings);
+  size_t n = 0;
+  for (const ShapePtr& shape : scene.shapes())
+    if (n++ < kMostShapes) search.probe(*shape, Transform());
+  for (const Instance& instance : scene.instances())
+    for (const ShapePtr& shape : instance.group->shapes)
+      if (n++ < kMostShapes) search.probe(*shape, instance.to_world);
+  search.finish();
+}
+
+}  // namespace covary
