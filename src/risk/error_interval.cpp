@@ -48,6 +48,12 @@ void scale(Image& std_error, double factor) {
   for (float& value : std_error.data) value *= static_cast<float>(std::sqrt(factor));
 }
 
+/// The first image is the mean, or that of an estimator, whose error its own standard error tells.
+void scale_candidates(MeasuredRisks& risks, double factor, double variance_over_error) {
+  for (size_t i = 1; i < risks.images.size(); ++i) risks.images[i].relmse *= factor;
+  risks.bias_share = std::clamp(1 - variance_over_error, 0.0, 1.0);
+}
+
 /// Whether images of this kind with few groups have a separate fit.
 bool fitted_to_few(ErrorKind kind) { return kind == ErrorKind::kFilters || kind == ErrorKind::kNetwork; }
 
@@ -134,6 +140,7 @@ void apply_interval(EstimatorResult& result) {
   const double middle = std::exp(error.middle) / predicted;
   const bool scaled = result.risk_kind != ErrorKind::kMean;
   if (scaled) scale(result.std_error, middle);
+  if (result.risks) scale_candidates(*result.risks, middle, sums.variance / (sums.values * std::exp(error.middle)));
   result.interval = ErrorInterval{scaled ? 1 : middle, std::exp(error.low - error.middle),
                                   std::exp(error.high - error.middle), unknown_error(sums, result.risk_kind, error)};
 }

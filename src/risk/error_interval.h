@@ -48,8 +48,9 @@ bool has_rare_light(const RiskRow& sums);
 std::string unknown_error(const RiskRow& sums, ErrorKind kind, const LogError& error);
 
 /// Scales the standard error of `result` so that its relMSE is the middle of the interval (not for a mean, which is
-/// unbiased in every pixel), and sets `result.interval` and `result.risk_sums`. Empties `result.risk_rows`; does
-/// nothing if there are none.
+/// unbiased in every pixel), and by the same factor the errors of the candidates that it was mixed of, which are known
+/// relative to its own; sets `result.interval` and `result.risk_sums`. Empties `result.risk_rows`; does nothing if
+/// there are none.
 void apply_interval(EstimatorResult& result);
 
 }  // namespace covary

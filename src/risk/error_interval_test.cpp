@@ -54,6 +54,21 @@ TEST(ErrorInterval, IsAroundThePredictedError) {
   }
 }
 
+/// Candidates are known relative to the mixture: what is said of the mixture is said of them, too, so that their order
+/// does not depend on the fit. The mean's error is its own.
+TEST(ErrorInterval, ScalesTheErrorsOfCandidatesLikeThatOfTheirMixture) {
+  EstimatorResult result = result_of(known_sums(), ErrorKind::kNetwork);
+  const double before = predicted_relmse(result);
+  result.risks = MeasuredRisks{before, 0.5, {{"mean", 0.03}, {"oidn", 1.2 * before}, {"sharp", 0.9 * before}}};
+  apply_interval(result);
+  const double middle = predicted_relmse(result);
+  EXPECT_GT(std::abs(middle / before - 1), 0.05) << "the fit changes it";
+  EXPECT_EQ(result.risks->images[0].relmse, 0.03);
+  EXPECT_NEAR(result.risks->images[1].relmse / middle, 1.2, 1e-5);
+  EXPECT_NEAR(result.risks->images[2].relmse / middle, 0.9, 1e-5);
+  EXPECT_NEAR(result.risks->bias_share, std::max(0.0, 1 - known_sums().variance / known_sums().values / middle), 1e-5);
+}
+
 /// log(relMSE) by the documented formulas, step by step.
 double middle_by_hand(const RiskRow& s, const ErrorFeatures& a, double part = 1) {
   const double risk = s.error + 0.27 * s.covariance;
