@@ -21,7 +21,7 @@ int band_rows(const Film& film) {
 
 }  // namespace
 
-SplatLayer::SplatLayer(Film& film) : film_(film) {
+SplatLayer::SplatLayer(Film& film, bool allows_negative) : film_(film), allows_negative_(allows_negative) {
   const std::vector<uint32_t>& counts = film.counts();
   COVARY_CHECK(!counts.empty(), "a light film needs pixels");
   if (!std::all_of(counts.begin(), counts.end(), [&](uint32_t n) { return n == counts[0]; }))
@@ -54,7 +54,8 @@ void SplatLayer::add(uint64_t path, int x, int y, const Spectrum& value) {
   const int column = x - film_.crop().x, row = y - film_.crop().y;
   if (column < 0 || row < 0 || column >= film_.width() || row >= film_.height()) return;
   Bundle& list = bundles_[bundle - first_];
-  if (!is_finite(value) || value.r < 0 || value.g < 0 || value.b < 0) [[unlikely]] {
+  const bool negative = value.r < 0 || value.g < 0 || value.b < 0;
+  if (!is_finite(value) || (negative && !allows_negative_)) [[unlikely]] {
     list.bad.push_back({path, x, y, value});
     return;
   }

@@ -55,8 +55,9 @@ class SplatLayer {
   static constexpr uint32_t kRoundBundles = 1024;
 
   /// Continues `film`, which must outlive the layer. Marks it as a light film. Throws Error(kInput) when its pixels
-  /// differ in count, or when it has samples and is not a light film with bundles of this size.
-  explicit SplatLayer(Film& film);
+  /// differ in count, or when it has samples and is not a light film with bundles of this size. `allows_negative`:
+  /// negative splats are no bad ones.
+  explicit SplatLayer(Film& film, bool allows_negative = false);
 
   /// Begins the next round on the way to `target` bundles (a multiple of the film's groups), discarding what an
   /// unfinished round has collected. Returns false if the film already has that many.
@@ -88,6 +89,7 @@ class SplatLayer {
   void count_splats();
 
   Film& film_;
+  bool allows_negative_;
   uint32_t first_ = 0, end_ = 0;
   std::vector<Bundle> bundles_;
   SplatCounts counts_;

@@ -143,7 +143,7 @@ namespace {
 
 /// pbrt's picture is radiance times exposure time times ISO / 100, whatever the sensor, which changes colours: by its
 /// own response, and by white balance.
-void read_sensor(PbrtParameters& p, PbrtView& view) {
+void read_sensor(PbrtParameters& p, ObjectDescription& film, PbrtView& view) {
   const std::string sensor = p.get_string("sensor", "cie1931");
   const double iso = p.get_float("iso", 100), temperature = p.get_float("whitebalance", 0);
   if (iso > 0)
@@ -154,10 +154,11 @@ void read_sensor(PbrtParameters& p, PbrtView& view) {
     p.warn(fmt::format("has the sensor '{}'; its picture has the colours of 'cie1931' here", sensor));
   if (temperature > 0) {
     const auto m = pbrt_white_balance(temperature);
-    p.warn(
-        fmt::format("has a white balance of {} K, which is not applied: to have pbrt's picture, multiply R, G and B "
-                    "by the matrix [{:.4f} {:.4f} {:.4f}, {:.4f} {:.4f} {:.4f}, {:.4f} {:.4f} {:.4f}]",
-                    temperature, m[0][0], m[0][1], m[0][2], m[1][0], m[1][1], m[1][2], m[2][0], m[2][1], m[2][2]));
+    Matrix4 response{};
+    for (size_t i = 0; i < 3; ++i)
+      for (size_t k = 0; k < 3; ++k) response[i][k] = m[i][k];
+    response[3][3] = 1;
+    set_property(film, "response", Transform(response));
   }
   if (const double most = p.get_float("maxcomponentvalue", kInfinity); most < kInfinity)
     p.warn(
@@ -199,7 +200,7 @@ void read_pbrt_film(const std::string& type, PbrtParameters& p, PbrtView& view) 
     set_property(*film, "crop_offset_y", crop[2]);
     set_property(*film, "crop_height", crop[3] - crop[2]);
   }
-  read_sensor(p, view);
+  read_sensor(p, *film, view);
   p.ignore({"filename", "savefp16", "diagonal", "coordinatesystem", "nbuckets", "lambdamin", "lambdamax"});
   view.film = film;
 }

@@ -35,10 +35,13 @@ std::string relative_name(const fs::path& file, const fs::path& folder) {
   return failed || relative.empty() ? fs::absolute(file).string() : relative.string();
 }
 
-bool has_own_edge(const ObjectDescription& object) {
-  return object.kind == "emitter" && object.type == "spot" &&
-         std::any_of(object.properties.begin(), object.properties.end(),
-                     [](const Property& p) { return p.name == "falloff"; });
+/// A parameter that Mitsuba's plugin of the same name lacks; empty if there is none.
+std::string own_parameter(const ObjectDescription& object) {
+  for (const auto& [type, name] : {std::pair("spot", "falloff"), std::pair("hdrfilm", "response")})
+    if (object.type == type && std::any_of(object.properties.begin(), object.properties.end(),
+                                           [&, n = name](const Property& p) { return p.name == n; }))
+      return name;
+  return "";
 }
 
 /// Warns about plugins and parameters that Mitsuba 3 does not have.
@@ -51,8 +54,9 @@ void warn_of_own_plugins(const ObjectDescription& scene, std::vector<std::string
     const bool own = (object.kind == "texture" && object.type == "scale") ||
                      (object.kind == "integrator" && object.type == "bdpt") ||
                      (object.kind == "bsdf" && object.type == "metallicroughness");
-    if (has_own_edge(object) && told.insert("falloff").second)
-      warnings.push_back(object.where.text() + ": the spot has the parameter 'falloff', which Mitsuba 3 does not have");
+    if (const std::string name = own_parameter(object); !name.empty() && told.insert(name).second)
+      warnings.push_back(fmt::format("{}: the {} '{}' gets the parameter '{}', which Mitsuba 3 does not have",
+                                     object.where.text(), object.kind, object.type, name));
     if (own && told.insert(object.type).second)
       warnings.push_back(fmt::format("{}: becomes the {} '{}', which Mitsuba 3 does not have", object.where.text(),
                                      object.kind, object.type));

@@ -339,7 +339,7 @@ class Loader {
     result_.width = film.width, result_.height = film.height;
     result_.crop_x = film.crop_x, result_.crop_y = film.crop_y;
     result_.crop_width = film.crop_width, result_.crop_height = film.crop_height;
-    result_.filter = film.filter;
+    result_.filter = film.filter, parts_.film_response = film.response;
     result_.spp = sensor.sampler.sample_count;
     result_.sampler_type = sensor.sampler.type;
     result_.camera_to_world = sensor.to_world;

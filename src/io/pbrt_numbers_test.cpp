@@ -110,8 +110,7 @@ WorldBegin
 LightSource "point" "rgb I" [ 1 1 1 ]
 )");
   for (const char* message : {"has the sensor 'canon_eos_100d'; its picture has the colours of 'cie1931'",
-                              "has a white balance of 4000 K, which is not applied", "clamps samples to 20 in pbrt",
-                              "has an 'exposuretime', which pbrt does not read"})
+                              "clamps samples to 20 in pbrt", "has an 'exposuretime', which pbrt does not read"})
     EXPECT_TRUE(contains(warnings(scene), message));
   EXPECT_NEAR(scene.scene->emitters()[0]->power().g, 1.5f * 4 * kPi, 1e-4f);
 }
@@ -145,6 +144,36 @@ TEST_F(PbrtNumbers, WhiteBalanceMakesItsDaylightWhite) {
     for (size_t k = 0; k < 3; ++k)
       for (size_t l = 0; l < 3; ++l) sum[i] += lamp[i][k] * to_rgb[k][l] * a[l];
   for (const double value : sum) EXPECT_NEAR(value, 1, 3e-3);
+}
+
+/// film.h, RGBFilm: the white balance is applied to samples, and so to their mean.
+TEST_F(PbrtNumbers, WhiteBalanceChangesWhatTheFilmRecords) {
+  const std::string view = R"(
+PixelFilter "box"
+Integrator "path" "integer maxdepth" 2
+Camera "perspective"
+WorldBegin
+LightSource "infinite" "rgb L" [ .3 .6 .9 ]
+Material "diffuse" "rgb reflectance" [ .9 .5 .1 ]
+Shape "sphere" "float radius" 2
+Shape "disk" "float height" 5 "float radius" 3
+)";
+  const std::string size = "Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 6 ";
+  const LoadedScene plain = load(size + view), balanced = load(size + "\"float whitebalance\" 3500" + view);
+  EXPECT_EQ(warnings(balanced), warnings(plain));
+  EXPECT_FALSE(plain.scene->has_film_response());
+  ASSERT_TRUE(balanced.scene->has_film_response());
+  const auto m = pbrt_white_balance(3500);
+  const Spectrum radiance(0.2f, 0.7f, 0.4f), recorded = balanced.scene->on_film(radiance);
+  for (int i = 0; i < 3; ++i) {
+    const auto& row = m[static_cast<size_t>(i)];
+    EXPECT_NEAR(recorded[i], row[0] * radiance.r + row[1] * radiance.g + row[2] * radiance.b, 1e-5) << i;
+  }
+  const ConvertedScene converted = convert_scene(folder_.file("scene.pbrt"), folder_.file("out.xml"));
+  ASSERT_FALSE(converted.warnings.empty());
+  EXPECT_TRUE(contains(converted.warnings.back(), "the film 'hdrfilm' gets the parameter 'response'"));
+  write("out.xml", converted.document.xml);
+  EXPECT_EQ(load_scene(folder_.file("out.xml")).scene->on_film(radiance), recorded);
 }
 
 /// lights.cpp: PointLight, SpotLight, DistantLight and Light::Create.

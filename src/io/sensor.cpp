@@ -59,6 +59,13 @@ std::shared_ptr<FilmSettings> make_film(Parameters& p) {
   p.get_choice("component_format", "float32", {"float16", "float32"});
   for (const char* ignored : {"banner", "high_quality_edges", "sample_border", "compensate"})
     p.get_bool(ignored, false);
+  if (p.has("response")) {
+    const Matrix4 m = p.get_transform("response").matrix();
+    const auto row = [&](size_t i) {
+      return Spectrum(static_cast<float>(m[i][0]), static_cast<float>(m[i][1]), static_cast<float>(m[i][2]));
+    };
+    film->response = ColourMatrix{{row(0), row(1), row(2)}};
+  }
   if (const auto filter = only_child<FilterObject>(p, "rfilter")) film->filter = filter->settings;
   return film;
 }

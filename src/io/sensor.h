@@ -12,6 +12,7 @@ struct FilmSettings : SceneObject {
   int width = 768, height = 576;
   int crop_x = 0, crop_y = 0, crop_width = 768, crop_height = 576;
   FilterSettings filter{FilterKind::kGaussian, 2.0f, 0.5f};
+  std::optional<ColourMatrix> response;
 };
 
 struct FilterObject : SceneObject {

@@ -69,7 +69,7 @@ PassResult render_light_pass(const Scene& scene, const LightTracingIntegrator& i
   COVARY_CHECK(settings.pass >= kLightPass, "a light pass has random numbers of its own");
   COVARY_CHECK(integrator.traces_light(), "the integrator traces no light here");
   const uint32_t target = std::min(settings.spp.largest(), settings.limit);
-  SplatLayer layer(film);
+  SplatLayer layer(film, scene.has_film_response());
   const uint32_t begin = film.count(0, 0);
   PassLimits limits(settings, uint64_t{target - std::min(begin, target)} * kBundlePaths);
   PerThread<Worker> workers;
@@ -83,7 +83,7 @@ PassResult render_light_pass(const Scene& scene, const LightTracingIntegrator& i
       trace_sorted(scene, integrator, light_paths_of(settings, film.crop(), first_path, kBundlePaths), worker.splats,
                    worker.context);
       if (worker.context.stopped()) return;
-      for (const LightSplat& splat : worker.splats) layer.add(splat.path, splat.x, splat.y, splat.value);
+      for (const LightSplat& splat : worker.splats) layer.add(splat.path, splat.x, splat.y, scene.on_film(splat.value));
       limits.advance(kBundlePaths);
     });
     if (limits.ended()) break;
@@ -106,6 +106,7 @@ ReplayedLightPath replay_light_path(const Scene& scene, const LightTracingIntegr
   PathContext context(integrator);
   ReplayedLightPath replayed;
   integrator.trace_light_paths(scene, light_paths_of(settings, window, path, 1), replayed.splats, context);
+  for (LightSplat& splat : replayed.splats) splat.value = scene.on_film(splat.value);
   replayed.n_rays = context.n_rays;
   return replayed;
 }

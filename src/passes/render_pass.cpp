@@ -141,6 +141,7 @@ void trace_pixels(const Scene& scene, const Integrator& integrator, const PassSe
     for (uint32_t s = pixel.begin; s < pixel.end; ++s, ++sample) {
       if (!is_good(sample->radiance, film.crop().x + pixel.x, film.crop().y + pixel.y, s, worker))
         sample->radiance = Spectrum(0);
+      sample->radiance = scene.on_film(sample->radiance);
       if (!settings.estimate) film.add(pixel.x, pixel.y, sample->radiance);
     }
     if (!settings.estimate) continue;
@@ -340,7 +341,7 @@ ReplayedSample replay_sample(const Scene& scene, const Integrator& integrator, c
   PathContext context(integrator);
   CameraSample traced = camera_sample(scene, settings, x, y, sample);
   integrator.trace(scene, {&traced, 1}, context);
-  return {film_position(settings.filter, x, y, traced.random), traced.radiance, context.n_rays};
+  return {film_position(settings.filter, x, y, traced.random), scene.on_film(traced.radiance), context.n_rays};
 }
 
 }  // namespace covary

@@ -51,7 +51,8 @@ class PartTracer {
     for (size_t s = 0; s < worker.samples.size() && !stopped(); ++s) {
       const bool good = enters(worker.samples[s].radiance);
       for (size_t i = 0; i < parts_.size(); ++i)
-        parts_[i].add(worker.pixels[s], y, good ? worker.context.by_part.radiance[s * parts_.size() + i] : Spectrum());
+        parts_[i].add(worker.pixels[s], y,
+                      good ? scene_.on_film(worker.context.by_part.radiance[s * parts_.size() + i]) : Spectrum());
     }
     worker.samples.clear(), worker.pixels.clear();
   }

@@ -5,10 +5,12 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "core/colour_matrix.h"
 #include "core/keyed_transform.h"
 #include "core/rounding.h"
 #include "core/transform.h"
@@ -45,7 +47,8 @@ struct SceneParts {
   std::vector<Movement> movements;
   std::vector<std::shared_ptr<const Emitter>> emitters;  ///< in file order, area lights of `shapes` included
   std::shared_ptr<const Camera> camera;
-  MediumPtr camera_medium;   ///< that the camera is in; null: none
+  MediumPtr camera_medium;                    ///< that the camera is in; null: none
+  std::optional<ColourMatrix> film_response;  ///< from radiance to the film's values; none: they are the radiance
   std::string first_medium;  ///< location in the file of the first medium that is used; empty: there is none
 };
 
@@ -106,6 +109,12 @@ class Scene {
   std::span<const ShapePtr> shapes() const { return parts_.shapes; }
   std::span<const Instance> instances() const { return parts_.instances; }
   const Camera& camera() const { return *parts_.camera; }
+  /// Whether on_film() changes values, and may make them negative.
+  bool has_film_response() const { return parts_.film_response.has_value(); }
+  /// What the film records of this radiance. Integrators compute radiance; passes apply this to their results.
+  Spectrum on_film(const Spectrum& radiance) const {
+    return parts_.film_response ? *parts_.film_response * radiance : radiance;
+  }
   std::span<const std::shared_ptr<const Emitter>> emitters() const { return parts_.emitters; }
   /// The light at infinity that rays leaving the scene hit, or null.
   const Emitter* environment() const { return environment_; }

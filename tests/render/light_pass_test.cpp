@@ -93,6 +93,38 @@ TEST(LightPass, HasTheImageOfPathTracing) {
   }
 }
 
+/// Films record the radiance times their matrix, which may be negative: of camera samples, of light paths, and of
+/// replayed ones.
+TEST(LightPass, FilmsRecordTheirResponse) {
+  const std::string plain_text = corner_text(16, 12, "box"), film = "<film type='hdrfilm'>";
+  std::string text = plain_text;
+  text.insert(text.find(film) + film.size(),
+              "<transform name='response'><matrix value='.5 -2 .25 0  .1 1.5 0 0  0 -.25 2 0  0 0 0 1'/></transform>");
+  const Spectrum rows[] = {{0.5f, -2, 0.25f}, {0.1f, 1.5f, 0}, {0, -0.25f, 2}};
+  for (const LightTracing mode : {LightTracing::kOff, LightTracing::kOn}) {
+    const TestScene plain = light_scene(plain_text, mode), balanced = light_scene(text, mode);
+    const auto film_of = [&](const TestScene& scene) {
+      return mode == LightTracing::kOn ? light_film(scene, 16, 4) : render(scene, 4, 3);
+    };
+    const Film a = film_of(plain), b = film_of(balanced);
+    int n_negative = 0;
+    for (int y = 0; y < 12; ++y)
+      for (int x = 0; x < 16; ++x) {
+        const Spectrum radiance = a.mean(x, y), recorded = b.mean(x, y);
+        n_negative += recorded.r < 0;
+        for (int c = 0; c < 3; ++c)
+          EXPECT_NEAR(recorded[c], rows[c].r * radiance.r + rows[c].g * radiance.g + rows[c].b * radiance.b,
+                      1e-5f * (1 + 3 * max_component(radiance)));
+      }
+    EXPECT_GT(n_negative, 20);
+  }
+  const TestScene scene = light_scene(text, LightTracing::kOff);
+  PassSettings settings;
+  settings.seed = 3, settings.filter = scene.loaded.filter;
+  const Film one = render(scene, 1, 3);
+  EXPECT_EQ(replay_sample(scene.scene(), scene.integrator(), settings, 7, 5, 0).value, one.mean(7, 5));
+}
+
 TEST(LightPass, ACropHasTheImageOfItsPixels) {
   const TestScene whole = light_scene(corner_text(16, 12, "gaussian"));
   const CropWindow crop{3, 2, 9, 8};
