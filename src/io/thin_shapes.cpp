@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 
+#include "scene/curve.h"
 #include "scene/mesh.h"
 
 namespace covary {
@@ -109,9 +110,18 @@ void warn_of_thin_shapes(const Scene& scene, const std::function<std::string(con
   size_t n = 0;
   for (const ShapePtr& shape : scene.shapes())
     if (n++ < kMostShapes) search.probe(*shape, Transform());
+  std::set<const ShapeGroup*> groups;
   for (const Instance& instance : scene.instances())
-    for (const ShapePtr& shape : instance.group->shapes)
+    for (const ShapePtr& shape : instance.group->shapes) {
       if (n++ < kMostShapes) search.probe(*shape, instance.to_world);
+      const auto* curve = dynamic_cast<const CurveShape*>(shape.get());
+      if (curve && curve->kind() == CurveKind::kLinear && curve->shortest_segment() < kShortSegment / 8 &&
+          groups.insert(instance.group.get()).second)
+        warnings.push_back(
+            fmt::format("{} has segments of length {:.2g} in a shapegroup, which the ray tracer may see too thick; "
+                        "expected at least {:.2g}: enlarge them, and scale the instances down",
+                        name_of(*shape), curve->shortest_segment(), kShortSegment / 8));
+    }
   search.finish();
 }
 

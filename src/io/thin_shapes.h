@@ -12,7 +12,8 @@ namespace covary {
 /// Appends warnings of shapes that are thin for where they stand: at some of a few points, their thickness is less than
 /// kFewestSpacings spacings of floats there, so that rays may miss a side of them. `name_of` gives a shape's place in
 /// the file and its type. At most four warnings. Shapes are probed that are far from the origin for their size: within
-/// 32 of their diameters, only a thickness of less than about 1e-4 of the diameter could be lost.
+/// 32 of their diameters, only a thickness of less than about 1e-4 of the diameter could be lost. Linear curves in
+/// groups whose segments are too short for the ray tracer are named, too.
 void warn_of_thin_shapes(const Scene& scene, const std::function<std::string(const Shape&)>& name_of,
                          std::vector<std::string>& warnings);
 

@@ -39,6 +39,16 @@ CurveShape::CurveShape(CurveKind kind, std::vector<CurvePoint> points, std::vect
     if (first + n > points_.size()) throw Error(ErrorCode::kInput, "a curve refers to a missing control point");
 }
 
+float CurveShape::shortest_segment() const {
+  float shortest = kInfinity;
+  for (const uint32_t i : segments_) {
+    const CurvePoint &a = points_[i], &b = points_[i + 1];
+    const float l = length(Vec3{b[0], b[1], b[2]} - Vec3{a[0], a[1], a[2]});
+    if (l > 0) shortest = std::min(shortest, l);
+  }
+  return shortest;
+}
+
 CurveShape::Centre CurveShape::centre(uint32_t segment, float v) const {
   const CurvePoint* q = &points_[segments_[segment]];
   const Vec3 origin{q[0][0], q[0][1], q[0][2]};

@@ -10,6 +10,10 @@ namespace covary {
 
 enum class CurveKind { kLinear, kBspline };
 
+/// Embree 3.13 misses linear curves, or sees them too thick, if their segments are shorter than about 0.005: those that
+/// are shorter than this are traced enlarged.
+inline constexpr float kShortSegment = 0.0625f;
+
 /// A control point: x, y, z and the radius there, laid out as the ray tracer reads it.
 using CurvePoint = std::array<float, 4>;
 
@@ -30,6 +34,8 @@ class CurveShape final : public Shape {
   std::shared_ptr<Shape> transformed(const Transform& to_world) const override;
 
   CurveKind kind() const { return kind_; }
+  /// Length of the shortest segment of positive length between its first two control points; infinity: there is none.
+  float shortest_segment() const;
   const std::vector<CurvePoint>& points() const { return points_; }
   const std::vector<uint32_t>& segments() const { return segments_; }
 

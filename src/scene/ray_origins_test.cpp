@@ -234,5 +234,18 @@ TEST(RayOrigins, ShadowRaysEndBetweenALightAndItsShade) {
   }
 }
 
+/// Embree's linear curves of such small segments were missed or too thick; a curve of one unit is the reference.
+TEST(RayOrigins, LinearCurvesAreAsThickAtEverySize) {
+  const auto n_hits = [](float scale) {
+    const Place place{0, scale};
+    return for_each_hit(*scene_of({tube(place.to_world(), CurveKind::kLinear)}), place,
+                        [](const SurfaceHit&, const Vec3&, Vec2) {});
+  };
+  const int expected = n_hits(1);
+  EXPECT_GT(expected, 100);
+  for (const float scale : {1e-5f, 1e-4f, 1e-3f, 0.003f, 0.01f, 0.1f, 10.0f, 1e4f})
+    EXPECT_NEAR(n_hits(scale), expected, 2) << scale;
+}
+
 }  // namespace
 }  // namespace covary

@@ -1,21 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/ray_tracer.h"
 
-// CMakeLists.txt also prefers Embree 4 if both are installed.
-#if __has_include(<embree4/rtcore.h>)
-#include <embree4/rtcore.h>
-#else
-#include <embree3/rtcore.h>
-#endif
-
 #include <algorithm>
 #include <map>
 #include <string>
+#include <utility>
 
 #include "core/detached_work.h"
 #include "core/error.h"
-#include "scene/analytic_shape.h"
-#include "scene/curve.h"
+#include "scene/embree_geometry.h"
 #include "scene/mesh.h"
 
 namespace covary {
@@ -23,111 +16,6 @@ namespace {
 
 void on_embree_error(void*, RTCError code, const char* text) {
   throw Error(ErrorCode::kInternal, "Embree error " + std::to_string(code) + ": " + (text ? text : "no description"));
-}
-
-Ray to_ray(RTCRayN* ray, unsigned n, unsigned i) {
-  return {{RTCRayN_org_x(ray, n, i), RTCRayN_org_y(ray, n, i), RTCRayN_org_z(ray, n, i)},
-          {RTCRayN_dir_x(ray, n, i), RTCRayN_dir_y(ray, n, i), RTCRayN_dir_z(ray, n, i)},
-          RTCRayN_tfar(ray, n, i)};
-}
-
-void analytic_bounds(const RTCBoundsFunctionArguments* args) {
-  Bounds3 b = static_cast<const AnalyticShape*>(args->geometryUserPtr)->bounds();
-  b.lower += abs(b.lower) * (-4 * kRounding), b.upper += abs(b.upper) * (4 * kRounding);  // they are rounded
-  *args->bounds_o = {b.lower.x, b.lower.y, b.lower.z, 0, b.upper.x, b.upper.y, b.upper.z, 0};
-}
-
-void analytic_intersect(const RTCIntersectFunctionNArguments* args) {
-  const auto* shape = static_cast<const AnalyticShape*>(args->geometryUserPtr);
-  RTCRayN* rays = RTCRayHitN_RayN(args->rayhit, args->N);
-  RTCHitN* hits = RTCRayHitN_HitN(args->rayhit, args->N);
-  for (unsigned i = 0; i < args->N; ++i) {
-    if (!args->valid[i]) continue;
-    const float t = shape->intersect(to_ray(rays, args->N, i));
-    if (t == kInfinity) continue;
-    RTCRayN_tfar(rays, args->N, i) = t;
-    RTCHitN_geomID(hits, args->N, i) = args->geomID;
-    RTCHitN_primID(hits, args->N, i) = args->primID;
-    RTCHitN_instID(hits, args->N, i, 0) = args->context->instID[0];
-  }
-}
-
-void analytic_occluded(const RTCOccludedFunctionNArguments* args) {
-  const auto* shape = static_cast<const AnalyticShape*>(args->geometryUserPtr);
-  for (unsigned i = 0; i < args->N; ++i)
-    if (args->valid[i] && shape->intersect(to_ray(args->ray, args->N, i)) != kInfinity)
-      RTCRayN_tfar(args->ray, args->N, i) = -kInfinity;
-}
-
-void set_mesh(RTCGeometry geometry, const TriangleMesh& mesh) {
-  // Embree reads 16 bytes per vertex; a record is longer than that, so reading the last one is safe too.
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.vertices().data(), 0,
-                             sizeof(TriangleMesh::Vertex), mesh.vertices().size());
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles().data(), 0,
-                             sizeof(mesh.triangles()[0]), mesh.triangles().size());
-}
-
-void set_analytic(RTCGeometry geometry, const AnalyticShape& shape) {
-  rtcSetGeometryUserPrimitiveCount(geometry, 1);
-  rtcSetGeometryUserData(geometry, const_cast<AnalyticShape*>(&shape));
-  rtcSetGeometryBoundsFunction(geometry, analytic_bounds, nullptr);
-  rtcSetGeometryIntersectFunction(geometry, analytic_intersect);
-  rtcSetGeometryOccludedFunction(geometry, analytic_occluded);
-}
-
-/// Curves are visible from outside only, as in Mitsuba; in Embree, that is only a compile-time option.
-void pass_from_inside(const RTCFilterFunctionNArguments* args) {
-  for (unsigned i = 0; i < args->N; ++i) {
-    if (!args->valid[i]) continue;
-    const Vec3 d = to_ray(args->ray, args->N, i).d;
-    const Vec3 n{RTCHitN_Ng_x(args->hit, args->N, i), RTCHitN_Ng_y(args->hit, args->N, i),
-                 RTCHitN_Ng_z(args->hit, args->N, i)};
-    if (dot(d, n) > 0) args->valid[i] = 0;
-  }
-}
-
-void set_curve(RTCGeometry geometry, const CurveShape& curve) {
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, curve.points().data(), 0,
-                             sizeof(CurvePoint), curve.points().size());
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, curve.segments().data(), 0,
-                             sizeof(uint32_t), curve.segments().size());
-  rtcSetGeometryIntersectFilterFunction(geometry, pass_from_inside);
-  rtcSetGeometryOccludedFilterFunction(geometry, pass_from_inside);
-}
-
-RTCGeometryType type_of(const Shape& shape) {
-  if (dynamic_cast<const TriangleMesh*>(&shape)) return RTC_GEOMETRY_TYPE_TRIANGLE;
-  const auto* curve = dynamic_cast<const CurveShape*>(&shape);
-  if (!curve) return RTC_GEOMETRY_TYPE_USER;
-  return curve->kind() == CurveKind::kLinear ? RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE
-                                             : RTC_GEOMETRY_TYPE_ROUND_BSPLINE_CURVE;
-}
-
-/// Sets the geometry, which must be of the shape's type, to the shape.
-void set_shape(RTCGeometry geometry, const Shape& shape) {
-  if (const auto* mesh = dynamic_cast<const TriangleMesh*>(&shape))
-    set_mesh(geometry, *mesh);
-  else if (const auto* curve = dynamic_cast<const CurveShape*>(&shape))
-    set_curve(geometry, *curve);
-  else
-    set_analytic(geometry, dynamic_cast<const AnalyticShape&>(shape));
-  rtcCommitGeometry(geometry);
-}
-
-/// The transformation as Embree has it, in floats.
-Transform rounded(const Transform& to_world) {
-  Matrix4 m = to_world.matrix();
-  for (auto& row : m)
-    for (double& x : row) x = static_cast<float>(x);
-  return Transform(m);
-}
-
-void set_placement(RTCGeometry geometry, const Transform& to_world) {
-  float columns[12];
-  for (int c = 0; c < 4; ++c)
-    for (int r = 0; r < 3; ++r) columns[c * 3 + r] = static_cast<float>(to_world.matrix()[r][c]);
-  rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
-  rtcCommitGeometry(geometry);
 }
 
 /// Rays are passed to Embree in packets: camera rays gain most, scattered ones a little; single ones lose little.
@@ -226,15 +114,14 @@ void release(RTCDevice device, RTCScene top, const auto& groups) {
 
 }  // namespace
 
-RayTracer::Group RayTracer::make_group(std::span<const ShapePtr> shapes, bool moves) const {
+RayTracer::Group RayTracer::make_group(std::span<const ShapePtr> shapes, bool instanced, bool moves) const {
   Group group;
   group.scene = rtcNewScene(device_);
   // According to Embree's manual, "low" quality builds a separate hierarchy (of medium quality) per geometry.
   rtcSetSceneBuildQuality(group.scene, moves ? RTC_BUILD_QUALITY_LOW : RTC_BUILD_QUALITY_MEDIUM);
   if (moves) rtcSetSceneFlags(group.scene, RTC_SCENE_FLAG_DYNAMIC);
   for (const ShapePtr& shape : shapes) {
-    const RTCGeometry geometry = rtcNewGeometry(device_, type_of(*shape));
-    set_shape(geometry, *shape);
+    const RTCGeometry geometry = make_geometry(device_, *shape, instanced);
     rtcAttachGeometryByID(group.scene, geometry, static_cast<unsigned>(group.shapes.size()));
     rtcReleaseGeometry(geometry);
     group.shapes.push_back(shape.get());
@@ -252,12 +139,12 @@ RayTracer::RayTracer(std::span<const ShapePtr> shapes, std::span<const Instance>
                     : "Embree cannot make a device: too little memory, too few threads allowed, or another processor");
   rtcSetDeviceErrorFunction(device_, on_embree_error, nullptr);
   try {
-    top_ = make_group(shapes, moves);
+    top_ = make_group(shapes, false, moves);
 
     std::map<const ShapeGroup*, size_t> index;
     for (const Instance& instance : instances)
       if (index.emplace(instance.group.get(), groups_.size()).second) {
-        groups_.push_back(make_group(instance.group->shapes));
+        groups_.push_back(make_group(instance.group->shapes, true, false));
         commit_scene(groups_.back().scene);
       }
     for (const Instance& instance : instances) {
@@ -285,7 +172,14 @@ RayTracer::Placed RayTracer::placed_at(const Group& group, const Transform& to_w
 RayTracer::~RayTracer() { release(device_, top_.scene, groups_); }
 
 void RayTracer::move_shape(size_t index, const Shape& shape) {
-  set_shape(rtcGetGeometry(top_.scene, static_cast<unsigned>(index)), shape);
+  if (const float scale = enlargement(shape); scale == 1 && enlargement(*top_.shapes[index]) == 1) {
+    set_shape(rtcGetGeometry(top_.scene, static_cast<unsigned>(index)), shape);
+  } else {
+    rtcDetachGeometry(top_.scene, static_cast<unsigned>(index));
+    const RTCGeometry geometry = make_geometry(device_, shape, false);
+    rtcAttachGeometryByID(top_.scene, geometry, static_cast<unsigned>(index));
+    rtcReleaseGeometry(geometry);
+  }
   top_.shapes[index] = &shape;
   top_.meshes[index] = dynamic_cast<const TriangleMesh*>(&shape);
 }
@@ -311,12 +205,16 @@ void RayTracer::nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool 
       packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
     }
     query.nearest(valid, top_.scene, packet);
-    for (size_t i = 0; i < n; ++i)
-      hits[first + i] = {packet.ray.tfar[i],
-                         {packet.hit.u[i], packet.hit.v[i]},
-                         packet.hit.primID[i],
-                         packet.hit.geomID[i],
-                         packet.hit.instID[0][i]};
+    for (size_t i = 0; i < n; ++i) {
+      RayHit& hit = hits[first + i];
+      hit = {packet.ray.tfar[i],
+             {packet.hit.u[i], packet.hit.v[i]},
+             packet.hit.primID[i],
+             packet.hit.geomID[i],
+             packet.hit.instID[0][i]};
+      // A shape that is an instance of itself.
+      if (hit.instance < top_.shapes.size()) hit.geometry = std::exchange(hit.instance, RayHit::kNone);
+    }
     // Prefetch what resolve() reads of a mesh: the triangles here, their vertices below.
     for (size_t i = first; i < first + n; ++i)
       if (const TriangleMesh* mesh = mesh_of(hits[i])) __builtin_prefetch(&mesh->triangles()[hits[i].primitive]);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only code that uses Embree, version 3 or 4.
+// Rays through shapes, by Embree.
 #pragma once
 
 #include <memory>
@@ -48,7 +48,8 @@ class RayTracer {
     Transform to_world;
     Vec3 slack;  // errors of Embree's transformation of rays to the group's space (core/rounding.h)
   };
-  Group make_group(std::span<const ShapePtr> shapes, bool moves = false) const;
+  /// `instanced`: for a group that instances place.
+  Group make_group(std::span<const ShapePtr> shapes, bool instanced, bool moves) const;
   static Placed placed_at(const Group& group, const Transform& to_world);
 
   RTCDeviceTy* device_ = nullptr;
