@@ -10,7 +10,9 @@
 #include <thread>
 
 #include "combine/registry.h"
+#include "core/random.h"
 #include "core/stop.h"
+#include "core/stopwatch.h"
 #include "film/film_file.h"
 #include "film/image_file.h"
 #include "plans/budget.h"
@@ -76,6 +78,26 @@ TEST(Render, AnEstimateThatTookLongUntilItWasStoppedIsNotMadeAgain) {
     EXPECT_EQ(n_estimates, expected) << milliseconds;
     EXPECT_EQ(result.passes[0].film.mean_count(), 12);
   }
+}
+
+/// Scenes that stopped work has loaded live on beside those of other work that is stopped, as in programs that use the
+/// library; a render of the last one has the bits of the first.
+TEST(Render, StopsAtAnyTimeWhileScenesLive) {
+  std::vector<LoadedScene> kept;
+  const auto work = [&] {
+    kept.push_back(load_sized(kRoom, 64, 48));
+    return render(kept.back(), average_plan(), request_of(48)).image.estimate.data;
+  };
+  const Stopwatch watch;
+  const std::vector<float> expected = work();
+  const double seconds = watch.seconds();
+  for (uint64_t i = 0; i < 20; ++i) {
+    const double chance = PathRandom(Sampling::kIndependent, 1, 0, i, 0).get_1d(0, Event::kPixel);
+    const Stopwatch since;
+    run_stoppable([&] { return since.seconds() > chance * seconds; }, work);
+    EXPECT_EQ(render(kept.back(), average_plan(), request_of(48)).image.estimate.data, expected);
+  }
+  EXPECT_EQ(work(), expected);
 }
 
 TEST(Render, StoppedAtManyTilesAndResumedGivesTheSameBits) {
