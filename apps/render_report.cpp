@@ -115,6 +115,7 @@ void add_results(const RenderReport& report, const Estimator& estimator, nlohman
   add_network(estimator.network, result.image.network_runs, report.options.settings.denoising, json);
   if (!result.image.note.empty()) json["note"] = result.image.note;
   if (result.until_reached) json["until_reached"] = *result.until_reached;
+  if (result.of_time) json["time_choice"] = result.of_time->text();
 }
 
 }  // namespace
@@ -199,10 +200,12 @@ void print_summary(const RenderReport& report) {
   }
   print_notes(options.settings.denoising, result.image.note);
   const double limit = options.request().seconds;
-  if (limit > 0 && result.seconds.limited > 1.05 * limit)
-    fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for at least {} samples per pixel in each pass{}\n",
-               limit, result.seconds.limited, result.passes[0].film.groups(),
-               estimator.passes == EstimatorPasses::kPair ? " and the estimate" : "");
+  if (result.of_time)
+    fmt::print(stderr, "--time {:g} sufficed for {:g} samples per pixel; the same image: {}\n", limit,
+               result.samples_per_pixel(), result.of_time->text());
+  if (limit > 0 && result.seconds.limited > 1.1 * limit)
+    fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for {:g} samples per pixel\n", limit,
+               result.seconds.limited, result.samples_per_pixel());
   if (result.predicted && result.image.risks)
     fmt::print(stderr, "{}\n", prediction_text(*result.predicted, result.image.risks));
 }

@@ -108,6 +108,9 @@ class RenderResult(Result):
     complete: bool
     #: Whether the predicted error is at most the target; None without a target.
     until_reached: bool | None
+    #: After a time limit: what the clock decided, as options of the program, which make the same image again; None
+    #: without one, or if pixels may differ in their numbers of samples.
+    time_choice: str | None
     #: For denoised images: the fraction of predicted_relmse that is squared bias, and by name the relMSE that the mean
     #: of the samples and each denoised image alone would have had.
     bias_share: float | None

@@ -128,6 +128,7 @@ nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std:
   d["aovs"] = aovs;
   d["complete"] = result.complete;
   d["until_reached"] = result.until_reached;
+  d["time_choice"] = result.of_time ? nb::cast(result.of_time->text()) : nb::none();
   nb::dict risks;
   std::optional<double> bias_share;
   if (result.image.risks) {

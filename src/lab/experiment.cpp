@@ -347,7 +347,7 @@ class Experiment {
       const std::string where = fmt::format("{}, {}, {}: ", suite.scenes[cell.scene].name,
                                             suite.methods[cell.method].name, suite.budgets[cell.budget].label());
       for (const std::string& text : cell.suspicions) results_.warnings.push_back(where + text);
-      if (std::abs(cell.time_ratio - 1) > 0.05)
+      if (std::abs(cell.time_ratio - 1) > 0.1)
         results_.warnings.push_back(fmt::format("{}took {:.3g} s, {:+.0f} % off the budget", where,
                                                 cell.method_seconds.value, 100 * (cell.time_ratio - 1)));
     }

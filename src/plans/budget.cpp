@@ -15,6 +15,7 @@
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "film/groups.h"
+#include "integrators/aov.h"
 #include "plans/render.h"
 
 namespace covary {
@@ -23,6 +24,33 @@ namespace {
 constexpr uint32_t kFirstBudget = 96;
 /// For the next budget towards a target error: a larger one overshoots, a smaller one checks more often.
 constexpr double kMargin = 1.02, kLeastGrowth = 1.06;
+
+/// Samples per second of the second of two trials, of which the first warms the caches. `render` takes one sample of
+/// each pixel and returns their number.
+template <typename Render>
+double speed_of_trials(const LoadedScene& scene, const FilterSettings& filter, const CropWindow& window,
+                       const std::atomic<bool>* stop, const Render& render) {
+  constexpr int kCells = 8, kSide = 16;  // one square of pixels in each cell of a grid
+  PassSettings settings;
+  settings.spp = 1;
+  settings.filter = filter;
+  settings.stop = stop;
+  const auto trial = [&](uint64_t seed) {
+    settings.seed = seed;
+    std::atomic<uint64_t> n_samples{0};
+    const Stopwatch watch;
+    parallel_for(kCells * kCells, [&](int i) {
+      const int x = i % kCells * window.width / kCells, y = i / kCells * window.height / kCells;
+      const int width = std::clamp(window.width / kCells, 1, kSide),
+                height = std::clamp(window.height / kCells, 1, kSide);
+      Film film(scene.width, scene.height, {window.x + x, window.y + y, width, height}, 1);
+      n_samples += render(settings, film);
+    });
+    return static_cast<double>(n_samples) / watch.seconds();
+  };
+  trial(1);
+  return trial(2);
+}
 
 }  // namespace
 
@@ -68,26 +96,17 @@ void set_budget(const Shares& shares, const PlanState& state, std::span<Pass> pa
 
 double samples_per_second(const LoadedScene& scene, const Integrator& integrator, const FilterSettings& filter,
                           const CropWindow& window, const std::atomic<bool>* stop) {
-  constexpr int kCells = 8, kSide = 16;  // one square of pixels in each cell of a grid
-  PassSettings settings;
-  settings.spp = 1;
-  settings.filter = filter;
-  settings.stop = stop;
-  const auto trial = [&](uint64_t seed) {
-    settings.seed = seed;
-    std::atomic<uint64_t> n_samples{0};
-    const Stopwatch watch;
-    parallel_for(kCells * kCells, [&](int i) {
-      const int x = i % kCells * window.width / kCells, y = i / kCells * window.height / kCells;
-      const int width = std::clamp(window.width / kCells, 1, kSide),
-                height = std::clamp(window.height / kCells, 1, kSide);
-      Film film(scene.width, scene.height, {window.x + x, window.y + y, width, height}, 1);
-      n_samples += render_pass(*scene.scene, integrator, settings, film).n_samples;
-    });
-    return static_cast<double>(n_samples) / watch.seconds();
-  };
-  trial(1);  // warms the caches
-  return trial(2);
+  return speed_of_trials(scene, filter, window, stop, [&](const PassSettings& settings, Film& film) {
+    return render_pass(*scene.scene, integrator, settings, film).n_samples;
+  });
+}
+
+double auxiliary_samples_per_second(const LoadedScene& scene, const FilterSettings& filter, const CropWindow& window,
+                                    const std::atomic<bool>* stop) {
+  return speed_of_trials(scene, filter, window, stop, [&](const PassSettings& settings, Film& film) {
+    render_aovs(*scene.scene, settings, 1, film, stop);
+    return film.counts().size();
+  });
 }
 
 uint32_t next_budget(uint32_t budget, double predicted, double target, uint32_t limit, double most) {

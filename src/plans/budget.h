@@ -36,7 +36,6 @@ uint32_t first_budget(const LoadedScene& scene, const RenderRequest& request);
 /// Default number of groups of each pass that the estimator reads: choose_groups() of film/groups.h for the state's
 /// group_budget. With a time limit, when the number of samples is only roughly known, divisors do not help: 12, or
 /// fewer if there are fewer samples.
-/// fewer if there are fewer samples.
 int number_of_groups(const Shares& shares, const PlanState& state);
 
 /// Sets the samples per pixel of each pass for the state's budget: exactly, or, on the way to a target error, rounded
@@ -46,6 +45,10 @@ void set_budget(const Shares& shares, const PlanState& state, std::span<Pass> pa
 /// Samples per second, from trials of some ten milliseconds spread over the window. `stop` (may be null) ends them.
 double samples_per_second(const LoadedScene& scene, const Integrator& integrator, const FilterSettings& filter,
                           const CropWindow& window, const std::atomic<bool>* stop);
+
+/// The same for samples of the auxiliary images.
+double auxiliary_samples_per_second(const LoadedScene& scene, const FilterSettings& filter, const CropWindow& window,
+                                    const std::atomic<bool>* stop);
 
 /// The next budget on the way to a relMSE of `target`, at most `most` times as large: the error falls like 1 / samples,
 /// or more slowly.

@@ -21,6 +21,8 @@ inline constexpr const char* kTrial = "integrator_trial";  ///< the choice and i
 inline constexpr const char* kBudgets = "budgets";         ///< of a render to a target error (budget.h): "96 168"
 /// For a frame of a sequence, in film and result: a hash of everything that its image depends on.
 inline constexpr const char* kFrame = "frame";
+/// Of a render with a time limit: TimeChoice::text(), with which it is made again.
+inline constexpr const char* kTimeChoice = "time_choice";
 }  // namespace film_key
 
 /// Whether the result's file is the film itself, which can be continued.

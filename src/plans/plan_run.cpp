@@ -49,7 +49,8 @@ PlanRun::PlanRun(const LoadedScene& scene, const Plan& plan, const RenderRequest
       filter_(request.filter.value_or(scene.filter)),
       integrator_(prepared_integrator(scene, plan, request)),
       state_{scene, request, callbacks.stop, integrator_, 0, 0, {}},
-      rounds_(first_budget(scene, request)) {
+      rounds_(first_budget(scene, request)),
+      aov_samples_(request.aov_samples) {
   plan_.traces_light = has_light_pass(scene, plan, request);
 }
 
@@ -59,7 +60,7 @@ RenderResult PlanRun::run() {
   check_earlier_films(plan_, request_);
   try {
     result_.interrupted = !render_to_limits();
-    result_.complete = complete();
+    result_.complete = complete() && (!in_rounds() || state_.budget >= largest_budget(scene_, request_));
     if (result_.interrupted && can_estimate() && (!plan_.film_is_image || film_has_errors())) {
       keep_films_before_more();
       estimate();
@@ -67,6 +68,7 @@ RenderResult PlanRun::run() {
     const Stopwatch watch;
     write_files();
     result_.seconds.write += watch.seconds();
+    result_.seconds.limited = watch_.seconds();
   } catch (...) {
     keep_films_of_failure();
     throw;
@@ -97,7 +99,10 @@ bool PlanRun::render_to_limits() {
   if (!train(scene_, request_, *integrator_, settings, result_.seconds)) return false;
   const uint32_t limit = largest_budget(scene_, request_);
   state_.budget = state_.group_budget = rounds_.budget();
-  if (timed() && plan_.groups_follow_speed) {
+  if (in_rounds()) {
+    plan_rounds();
+    if (stopped()) return false;
+  } else if (timed() && plan_.groups_follow_speed) {
     // The number of samples possible in half of the time, so that no more groups are begun than can be filled.
     const double samples =
         0.5 * request_.seconds * samples_per_second(scene_, *state_.integrator, filter_, window_, callbacks_.stop);
@@ -111,6 +116,11 @@ bool PlanRun::render_to_limits() {
       share += plan_.phases[i].share;
       if (!render_phase(i, first ? share : 1)) return false;
     }
+    if (in_rounds() && next_round_fits()) {
+      if (stopped()) return false;
+      continue;
+    }
+    keep_choice();
     if (rounds_.repeat()) {
       state_.budget = rounds_.budget();
       continue;
@@ -119,12 +129,12 @@ bool PlanRun::render_to_limits() {
       keep_films_before_more();
       if (!estimate()) return false;
     }
-    result_.seconds.limited = watch_.seconds();
     if (request_.until > 0) result_.until_reached = error_to_limit() <= request_.until;
     if (callbacks_.predicted && result_.predicted)
       callbacks_.predicted(request_.until_in_blocks
                                ? PredictedError{error_to_limit(), std::nullopt, result_.predicted->doubt}
                                : *result_.predicted);
+    if (in_rounds()) return true;
     const bool out_of_time = timed() && seconds_left(plan_.phases.size() - 1, 1) <= 0;
     if (result_.until_reached.value_or(true) || state_.budget >= limit || out_of_time) return true;
     rounds_.add(next_budget(state_.budget, error_to_limit(), request_.until, limit,
@@ -146,28 +156,45 @@ bool PlanRun::render_phase(size_t index, double share) {
   if (passes.empty()) return false;  // interrupted before its films were created
   if (index + 1 == plan_.phases.size() && needs_aovs() && result_.aovs.empty()) render_auxiliary_images();
   state_.guides = guides();
-  if (timed()) state_.seconds_left = request_.seconds - watch_.seconds();
+  if (timed() && !in_rounds()) state_.seconds_left = request_.seconds - watch_.seconds();
   if (request_.until > 0) {
     state_.budget = rounds_.budget();  // an earlier call's film may have recorded it
     for (Pass& pass : state_.passes) pass.film.attributes[film_key::kBudgets] = rounds_.text();
   }
-  phase.set_targets(state_, passes.first(camera_passes(passes).size()));
+  set_targets(phase, passes.first(camera_passes(passes).size()));
   if (passes.back().plan.light) set_light_target(*state_.integrator, camera_passes(state_.passes), passes.back());
   for (Pass& pass : passes) pass.count = pass.settings.spp.reached(pass.film);
   if (index + 1 == plan_.phases.size() && !timed() && request_.until == 0) warn_of_other_samples(state_.budget);
   begin(RenderStage::kRendering);
   WaveLimits limits;
-  if (timed()) limits.seconds_left = [this, index, share] { return seconds_left(index, share); };
+  if (timed() && !in_rounds()) limits.seconds_left = [this, index, share] { return seconds_left(index, share); };
   limits.stop = callbacks_.stop;
+  const uint64_t later = in_rounds() ? uint64_t{largest_budget(scene_, request_) - state_.budget} * n_pixels() : 0;
   if (callbacks_.progress)
-    limits.progress = [this](uint64_t done, uint64_t total) { callbacks_.progress(done_ + done, done_ + total); };
+    limits.progress = [this, later](uint64_t done, uint64_t total) {
+      callbacks_.progress(done_ + done, done_ + total + later);
+    };
   limits.wave = [this] { between_waves(); };
   consistent_ = false;
+  const Stopwatch watch;
+  const double before = camera_samples();
   const uint64_t taken = render_passes(*scene_.scene, passes, limits);
+  round_seconds_ += watch.seconds(), round_samples_ += camera_samples() - before;
   consistent_ = true;
   done_ += taken;
   unsaved_ = unsaved_ || taken > 0;
   return !stopped() || complete();
+}
+
+void PlanRun::set_targets(const Phase& phase, std::span<Pass> passes) {
+  const auto has_few = [](const Pass& pass) {
+    return !pass.settings.spp.is_map() && pass.settings.spp.largest() < static_cast<uint32_t>(pass.film.groups());
+  };
+  phase.set_targets(state_, passes);
+  while (in_rounds() && state_.budget < largest_budget(scene_, request_) && std::ranges::any_of(passes, has_few)) {
+    ++state_.budget;  // a resumed film has more groups than this time allows, or a small share of the samples
+    phase.set_targets(state_, passes);
+  }
 }
 
 void PlanRun::begin_phase(const Phase& phase) {

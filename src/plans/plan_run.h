@@ -12,10 +12,12 @@
 #include "core/stopwatch.h"
 #include "plans/budget.h"
 #include "plans/render.h"
+#include "plans/time_budget.h"
 
 namespace covary {
 
-/// Phases and files of a render are in plan_run.cpp, the image computed from its films in plan_run_image.cpp.
+/// Phases and files of a render are in plan_run.cpp, the image of its films in plan_run_image.cpp, and the trials
+/// before a time limit is spent in time_trial.cpp.
 class PlanRun {
  public:
   PlanRun(const LoadedScene& scene, const Plan& plan, const RenderRequest& request, const RenderCallbacks& callbacks);
@@ -28,7 +30,19 @@ class PlanRun {
   /// Renders a phase, until `share` of the time limit is used. False if interrupted.
   bool render_phase(size_t index, double share);
   double seconds_left(size_t phase, double share);
+  /// Measures what the parts of the render take, warns if even the least takes too long, and sets the first budget.
+  void plan_rounds();
+  TimeCosts measure_costs();
+  double time_of_end(double seconds_per_sample);
+  double end_of_band(int n_rows, std::span<const PassPlan> plans);
+  /// Whether the time suffices for more samples, for which it sets the budget.
+  bool next_round_fits();
+  /// How often samples are traced: again for images of their parts.
+  double times_traced() const { return 1.0 + request_.splits_layers() + request_.path_lengths; }
+  void keep_choice();
   void begin_phase(const Phase& phase);
+  /// With in_rounds(), of a budget that gives each group of each pass a sample.
+  void set_targets(const Phase& phase, std::span<Pass> passes);
   Pass begin_pass(const PassPlan& plan);
   /// `layers`: films of parts of the last pass's samples.
   EstimatorResult estimate_rows(int first_row, int n_rows, std::span<const Film> layers = {}) const;
@@ -51,7 +65,15 @@ class PlanRun {
     if (callbacks_.stage) callbacks_.stage(stage);
   }
   bool has_training() const { return !result_.training.mean.data.empty(); }
+  uint64_t n_pixels() const { return static_cast<uint64_t>(window_.width) * static_cast<uint64_t>(window_.height); }
   bool timed() const { return request_.seconds > 0; }
+  /// A time limit is spent in rounds, each of the same number of samples in all pixels.
+  bool in_rounds() const { return timed() && plan_.phases.size() == 1 && request_.until == 0; }
+  double camera_samples() const {
+    double samples = 0;
+    for (const Pass& pass : camera_passes(state_.passes)) samples += pass.film.mean_count();
+    return samples;
+  }
   /// The error that RenderRequest::until limits.
   double error_to_limit() const {
     return request_.until_in_blocks ? result_.predicted_blocks : result_.predicted->relmse;
@@ -106,10 +128,13 @@ class PlanRun {
   std::vector<Film> layers_;  // with these names; empty until traced
   uint64_t done_ = 0;         // samples of this call, of earlier phases and rounds
   Stopwatch watch_, since_checkpoint_;
-  bool consistent_ = true;                  // the films are in the state between two waves
-  bool unsaved_ = false;                    // they have samples that have not been written
-  double estimate_stopped_after_ = 0;       // seconds
-  std::optional<double> estimate_seconds_;  // of the next estimate
+  bool consistent_ = true;                        // the films are in the state between two waves
+  bool unsaved_ = false;                          // they have samples that have not been written
+  double estimate_stopped_after_ = 0;             // seconds
+  std::optional<double> estimate_seconds_;        // of the next estimate
+  TimeCosts costs_;                               // with in_rounds(), like the two below
+  uint32_t aov_samples_;                          // RenderRequest::aov_samples, or fewer
+  double round_seconds_ = 0, round_samples_ = 0;  // of all rounds of this call
 };
 
 }  // namespace covary

@@ -26,8 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kTrialRows = 64;            // minimum, if the estimate is timed
-constexpr uint32_t kMostAovSamples = 64;  // per pixel of auxiliary images
+constexpr int kTrialRows = 64;  // minimum, if the estimate is timed
 /// Seconds of work after which films are worth saving, even unasked, before the image is computed from them.
 constexpr double kWorthKeeping = 10;
 constexpr double kEstimateOfInterrupted = 0.5;  // seconds allowed for it; after that the image is the mean
@@ -100,7 +99,7 @@ double PlanRun::time_estimate() {
 void PlanRun::render_auxiliary_images() {
   const Stopwatch watch;
   Pass& last = state_.passes[camera_passes(state_.passes).size() - 1];
-  render_aovs(*scene_.scene, last.settings, kMostAovSamples, last.film, callbacks_.stop);
+  render_aovs(*scene_.scene, last.settings, aov_samples_, last.film, callbacks_.stop);
   result_.aovs = std::exchange(last.film.aovs, {});
   result_.seconds.auxiliary = watch.seconds();
 }

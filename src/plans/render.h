@@ -15,6 +15,7 @@
 #include "passes/training_image.h"
 #include "plans/plan.h"
 #include "plans/render_request.h"
+#include "plans/time_budget.h"
 #include "risk/predicted_error.h"
 
 namespace covary {
@@ -42,10 +43,10 @@ struct RenderSeconds {
   double surrogate = 0;  ///< part of it: computing the importance of pixels
   double solve = 0;      ///< part of it: building the integrator's data structures from the samples
   double trial =
-      0;  ///< choosing an integrator by trial and, with a time limit, measuring the speed of passes and estimator
+      0;  ///< choosing an integrator by trial and, with a time limit, measuring what the parts of the render take
   double estimate = 0;  ///< of the final estimate, after the passes
   double write = 0;
-  double limited = 0;  ///< time that counts towards the limit, in this call
+  double limited = 0;  ///< time that counts towards the limit, in this call: all of it
 };
 
 /// The result of an integrator's trial.
@@ -72,7 +73,8 @@ struct RenderResult {
   TrainingImage training;
   std::map<std::string, Image> aovs;
   RenderSeconds seconds;
-  bool complete = false;              ///< all passes have the samples that were planned
+  bool complete = false;              ///< all passes have the samples that were asked for
+  std::optional<TimeChoice> of_time;  ///< with a time limit, if its image can be made again without one
   std::optional<bool> until_reached;  ///< whether the predicted error reached the target, if there was one
   bool interrupted = false;           ///< by the stop token
   std::string kept;                   ///< after an interruption: the file or folder with the films, empty if none

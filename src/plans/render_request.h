@@ -26,10 +26,12 @@ struct RenderRequest {
   /// Samples per pixel of all passes together, 1 … 2^30. Default: the scene's, or no limit if `seconds` or `until` is
   /// given.
   std::optional<uint32_t> spp;
-  double seconds = 0;            ///< > 0: limit for rendering and estimating together
+  double seconds = 0;            ///< > 0: limit for everything but loading
   double until = 0;              ///< > 0: add samples until the predicted relMSE is this small
   bool until_in_blocks = false;  ///< `until` means predicted_blocks() of predicted_error.h, not the whole image
   bool aovs = false;             ///< also the images Albedo, N and P
+  /// At most, per pixel of the auxiliary images (integrators/aov.h), at least 1. Fewer with `seconds`, if need be.
+  uint32_t aov_samples = 64;
   /// Also the images Edges01, Edges02, … of the last pass of camera samples (passes/sample_parts.h). Requires the
   /// integrator controlled-path.
   bool path_lengths = false;
@@ -79,7 +81,7 @@ inline void declare_goal(Settings& s, RenderRequest& r) {
             kBasicPasses);
   std::optional<double> seconds;
   s.real("time", seconds, {.low = 0, .above_low = true},
-         "Seconds for rendering and estimating, without loading and writing", kBasicPasses);
+         "Seconds for everything but loading; with too few, says so and does the least", kBasicPasses);
   if (seconds) r.seconds = *seconds;
 }
 
@@ -104,6 +106,8 @@ inline void declare(Settings& s, RenderRequest& r) {
   s.real("checkpoint", r.checkpoint_seconds, {.low = 0}, "Seconds between saving unfinished films; 0: never");
   r.preview = !s.flag("no-preview", "Do not write the PNG");
   s.flag("aovs", r.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
+  s.whole("aov-samples", r.aov_samples, {.low = 1, .high = 65536},
+          "Most samples per pixel of albedo, normal and position; fewer are taken where they have little noise");
   s.flag("layers", r.layers, "Add the layers Direct and Indirect, which add up to the image, denoised or not");
   s.flag("light-groups", r.light_groups,
          "Add a layer Combined_ID for the lights of each id, and Rest for the others, likewise");

@@ -12,7 +12,7 @@ import unittest
 from pathlib import Path
 
 from cli_test import COVARY, SLOWDOWN, CliTest
-from exr_reader import read_exr
+from exr_reader import header, read_exr
 
 SCENES = Path(os.environ["SCENES"])
 ROOM = str(SCENES / "room.xml")
@@ -534,8 +534,7 @@ class Time(RenderTest):
     def test_a_plain_render_uses_all_of_it(self):
         seconds = self.timed(1, "none")["seconds"]
         self.assertEqual(seconds["estimate"], 0)
-        self.assertLess(seconds["trial"], 0.1 * SLOWDOWN)
-        self.assertTrue(0.9 < seconds["render"] < 3 * SLOWDOWN, seconds)
+        self.assertTrue(0.8 < seconds["trial"] + seconds["render"] + seconds["write"] < 3 * SLOWDOWN, seconds)
 
     def test_every_pixel_has_samples_however_short_the_time(self):
         self.timed(0.001, "none")
@@ -546,10 +545,22 @@ class Time(RenderTest):
         result = self.good("render", ROOM, "--resolution", "400x300", "-o", "b.exr", *IICV, "--time", "0.001")
         self.assertIn("warning: --time 0.001 was exceeded", result.stderr)
 
-    def test_pixels_differ_by_a_factor_of_two_at_most(self):
-        self.timed(0.5, "none")
-        samples = read_exr((self.path / "a.exr").read_bytes())["samples"]
-        self.assertLessEqual(max(samples), 2 * min(samples))
+    def test_what_the_clock_decided_makes_the_same_image(self):
+        for arguments in (("none",), ("none", "--denoise", "auto", "--oidn", "off"), ("iicv",)):
+            with self.subTest(arguments):
+                facts = self.timed(1, *arguments, resolution="64x48")
+                choice = facts["time_choice"].split()
+                self.assertEqual(choice[:2], ["--spp", f"{facts['samples_per_pixel']:g}"])
+                self.assertEqual("--groups" in choice, arguments != ("none",))
+                timed = (self.path / "a.exr").read_bytes()
+                self.assertIn(facts["time_choice"].encode(), header(timed)[0]["covary:time_choice"])
+                self.good("render", ROOM, *SMALL, "-o", "b.exr", "--estimator", *arguments, *choice)
+                self.assertEqual(read_exr(timed), read_exr((self.path / "b.exr").read_bytes()))
+
+    def test_too_short_a_time_is_told_beforehand(self):
+        result = self.good("render", ROOM, "--resolution", "400x300", "-o", "a.exr", "--time", "0.001", *IICV)
+        self.assertRegex(result.stderr, r"warning: --time 0.001 is too short: the least takes about [0-9.e-]+ s \(")
+        self.assertLess(result.stderr.index("too short"), result.stderr.index("was exceeded"))
 
     def test_with_until(self):
         facts = self.timed(60, "iicv", "--until", "relmse=0.02", resolution="64x48")

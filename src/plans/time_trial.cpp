@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the parts of a render with a time limit take, from trials before it begins, and its rounds.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <utility>
+
+#include "combine/combine.h"
+#include "core/random.h"
+#include "core/stop.h"
+#include "film/film_file.h"
+#include "integrators/aov.h"
+#include "plans/pass_files.h"
+#include "plans/plan_run.h"
+#include "plans/result_files.h"
+
+namespace covary {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Rows of two trials of the estimate, whose difference leaves out what does not depend on the size.
+constexpr int kFewRows = 16, kMoreRows = 48;
+
+/// Uniform in [0, 1).
+float number(size_t i) { return PathRandom(Sampling::kIndependent, 1, 0, i, 0).get_1d(0, Event::kPixel); }
+
+/// An image without meaning, with noise.
+Image made_up_image(int width, int height) {
+  Image image(width, height, 3);
+  for (size_t i = 0; i < image.data.size(); ++i) image.data[i] = 0.4f + 0.2f * number(i);
+  return image;
+}
+
+/// A film without meaning: a sample in each group.
+Film made_up_film(int frame_width, int frame_height, const CropWindow& window, const PassPlan& plan) {
+  Film film(frame_width, frame_height, window, plan.groups);
+  if (plan.sample_variance) film.keep_sample_variance();
+  std::fill(film.counts().begin(), film.counts().end(), static_cast<uint32_t>(plan.groups));
+  for (size_t i = 0; i < film.data().size(); ++i) film.data()[i] = 0.2f + 0.6f * number(i);
+  return film;
+}
+
+uint32_t sum_of_groups(std::span<const PassPlan> plans) {
+  uint32_t sum = 0;
+  for (const PassPlan& plan : plans) sum += static_cast<uint32_t>(plan.groups);
+  return sum;
+}
+
+/// A name beside the output that no other program has.
+std::string trial_file(const std::string& output) {
+  const fs::path path(output);
+  return (path.parent_path() / fmt::format(".{}.{}.exr", path.stem().string(), getpid())).string();
+}
+
+}  // namespace
+
+/// Seconds for estimate and files of a band of the frame, whose samples are made up: all of it depends on sizes alone.
+double PlanRun::end_of_band(int n_rows, std::span<const PassPlan> plans) {
+  const CropWindow band{window_.x, window_.y + (window_.height - n_rows) / 2, window_.width, n_rows};
+  RenderResult result;
+  for (const PassPlan& plan : plans) {
+    Pass& pass = result.passes.emplace_back();
+    pass.plan = plan;
+    pass.film = made_up_film(scene_.width, scene_.height, band, plan);
+  }
+  if (needs_aovs())
+    for (const char* name : kAuxiliaryImages) result.aovs[name] = made_up_image(band.width, n_rows);
+  Beside beside;
+  if (plan_.reads_guides) beside.guides = guides_among(result.aovs);
+  const Stopwatch watch;
+  if (!plan_.film_is_image)
+    run_stoppable(callbacks_.stop, [&] {
+      result.image = plan_.estimate(result.passes, 0, n_rows, beside);
+      finish(result.image, nullptr);
+    });
+  if (stopped() || request_.output.empty()) return watch.seconds();
+  RenderRequest request = request_;
+  request.output = trial_file(request_.output), request.beside.clear();
+  try {
+    write_result_files(plan_, request, result);
+    if (!request_.passes.empty())
+      for (const Pass& pass : result.passes) write_film(request.output, pass.film);
+  } catch (const Error&) {  // the files of the render itself will say why
+  }
+  std::error_code ignored;
+  fs::remove(request.output, ignored);
+  fs::remove(preview_path(request.output), ignored);
+  return watch.seconds();
+}
+
+double PlanRun::time_of_end(double seconds_per_sample) {
+  state_.group_budget = static_cast<uint32_t>(
+      std::clamp(0.5 * request_.seconds / seconds_per_sample, 1.0, static_cast<double>(state_.budget)));
+  const std::vector<PassPlan> plans = plan_.phases[0].passes(state_);
+  const int height = window_.height;
+  end_of_band(std::min(height, kFewRows), plans);  // loads and warms what the others use
+  const double few = end_of_band(std::min(height, kFewRows), plans);
+  if (height <= kMoreRows) return few * height / std::min(height, kFewRows);
+  const double more = end_of_band(kMoreRows, plans);
+  const double per_row = std::max(more - few, more / kMoreRows * (kMoreRows - kFewRows) / 2) / (kMoreRows - kFewRows);
+  return more + per_row * (height - kMoreRows);
+}
+
+TimeCosts PlanRun::measure_costs() {
+  TimeCosts costs;
+  const auto pixels = static_cast<double>(n_pixels());
+  costs.sample =
+      times_traced() * pixels / samples_per_second(scene_, *state_.integrator, filter_, window_, callbacks_.stop);
+  if (needs_aovs()) costs.auxiliary = pixels / auxiliary_samples_per_second(scene_, filter_, window_, callbacks_.stop);
+  costs.end = time_of_end(costs.sample);
+  return costs;
+}
+
+void PlanRun::plan_rounds() {
+  const Stopwatch watch;
+  const uint32_t limit = largest_budget(scene_, request_);
+  costs_ = measure_costs();
+  if (stopped()) return;
+  state_.group_budget = 1;
+  const uint32_t fewest = sum_of_groups(plan_.phases[0].passes(state_));
+  result_.seconds.trial = watch.seconds();
+  const double left = request_.seconds - watch_.seconds();
+  const TimePlan plan = plan_time(costs_, left, fewest, aov_samples_);
+  if (plan.seconds > left && callbacks_.warning)
+    callbacks_.warning(fmt::format(
+        "`time` {:g} is too short: the least takes about {:.2g} s ({}{:.2g} for {} samples per pixel, {:.2g} for the "
+        "image and its files)",
+        request_.seconds, watch_.seconds() + plan.seconds,
+        costs_.auxiliary > 0 ? fmt::format("{:.2g} for auxiliary images, ", plan.aov_samples * costs_.auxiliary) : "",
+        plan.samples * costs_.sample, plan.samples, costs_.end));
+  if (needs_aovs()) aov_samples_ = plan.aov_samples;
+  // No more groups are begun than can be filled if the trials were wrong by a factor of two.
+  state_.group_budget = std::max(1u, std::min(limit, plan.samples / 2));
+  const uint32_t least = sum_of_groups(plan_.phases[0].passes(state_));
+  state_.budget = std::min(limit, first_round(plan, least));
+}
+
+bool PlanRun::next_round_fits() {
+  const auto taken = static_cast<uint32_t>(std::max<double>(state_.budget, std::floor(camera_samples())));
+  const double per_sample = round_samples_ > 0 ? round_seconds_ / round_samples_ : costs_.sample / times_traced();
+  const double later = costs_.end + (times_traced() - 1) * per_sample * taken;
+  const uint32_t next = next_round(taken, times_traced() * per_sample, request_.seconds - watch_.seconds() - later);
+  state_.budget = std::min(next, largest_budget(scene_, request_));
+  return state_.budget > taken;
+}
+
+/// Records what the clock decided.
+void PlanRun::keep_choice() {
+  if (!in_rounds()) return;
+  TimeChoice choice;
+  choice.samples = state_.budget;
+  if (plan_.groups_follow_speed) choice.groups = state_.passes[0].film.groups();
+  if (needs_aovs() && aov_samples_ != request_.aov_samples) choice.aov_samples = aov_samples_;
+  for (Pass& pass : state_.passes) pass.film.attributes[film_key::kTimeChoice] = choice.text();
+  result_.of_time = choice;
+}
+
+}  // namespace covary
