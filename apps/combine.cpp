@@ -155,11 +155,12 @@ GuideImages read_guides(const CombineOptions& o, const Estimator& estimator, con
   if (!guides.albedo)
     throw Error(ErrorCode::kInput,
                 fmt::format("--guides '{}' has no layer Albedo (Albedo.R, .G, .B) under any known name", o.guides));
-  for (const auto& guide :
-       {guides.albedo, guides.normal, guides.denoising_albedo, guides.denoising_normal, guides.position})
-    if (guide && (guide->width != file.width() || guide->height != file.height()))
-      throw Error(ErrorCode::kInput, fmt::format("--guides '{}' has {} x {} pixels, the images have {} x {}", o.guides,
-                                                 guide->width, guide->height, file.width(), file.height()));
+  if (const CropWindow& there = info.place.window, &here = file.place().window; !(info.place == file.place()))
+    throw Error(
+        ErrorCode::kInput,
+        fmt::format("--guides '{}' has {} x {} pixels at ({}, {}), the images have {} x {} at "
+                    "({}, {}), or another frame around them",
+                    o.guides, there.width, there.height, there.x, there.y, here.width, here.height, here.x, here.y));
   return guides;
 }
 

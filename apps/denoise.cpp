@@ -21,8 +21,10 @@
 #include "core/stopwatch.h"
 #include "declared_options.h"
 #include "denoising/mixed_denoising.h"
+#include "film/denoised_by.h"
 #include "film/image_file.h"
 #include "film/outputs.h"
+#include "filters/stray_values.h"
 #include "frame_files.h"
 #include "guide_layer.h"
 #include "metrics/provenance.h"
@@ -56,9 +58,13 @@ void check(const Options& o) {
 }
 
 void warn_of_values(const std::string& path, const Image& image) {
-  const auto n = std::count_if(image.data.begin(), image.data.end(), [](float v) { return !std::isfinite(v); });
-  if (n > 0)
-    fmt::print(stderr, "warning: {}: {} of {} values are not finite; they count as 0\n", path, n, image.data.size());
+  std::vector<StrayValue> replaced;
+  with_usable_values(image, &replaced);
+  if (replaced.empty()) return;
+  fmt::print(stderr,
+             "warning: {}: {} of {} pixels hold values that are NaN, infinite, overflow or outshine the whole picture "
+             "{:.0f} times, the first at ({}, {}); the pixels around replace them\n",
+             path, replaced.size(), image.data.size() / 3, kMostOfPicture, replaced[0].x, replaced[0].y);
 }
 
 /// The guide layers, each averaged over the files that have it.
@@ -91,12 +97,7 @@ class GuideLayers {
   static std::optional<Image> guide(const std::string& path, const ImageInfo& info, const std::string& name,
                                     GuideKind kind) {
     if (name.empty()) return find_guide(path, info, kind);
-    Image found = named_guide(path, info, name);
-    if (found.width != info.place.window.width || found.height != info.place.window.height)
-      throw Error(ErrorCode::kInput,
-                  fmt::format("'{}' has {} x {} pixels, '{}' {} x {}", name, found.width, found.height, path,
-                              info.place.window.width, info.place.window.height));
-    return found;
+    return named_guide(path, info, name);
   }
 
   static void add(const std::string& path, std::optional<Image> layer, std::optional<Image>& sum, float& n) {
@@ -127,6 +128,8 @@ void denoise_by_network(const Options& o, const GuideLayers& guides, ProgressLin
   require_image_memory(input, info.place.window.width, info.place.window.height, kImages + kNetworkBytes);
   const PlacedImage image = read_image(input);
   warn_of_values(input, image.image);
+  if (const std::string by = denoised_by(info.attributes, info.channels); !by.empty())
+    fmt::print(stderr, "warning: {} is denoised already ({}); give the render before denoising\n", input, by);
   progress.begin("denoising");
   Denoiser denoiser(o.denoiser());
   std::optional<Image> albedo = guides.albedo, normal = guides.normal;

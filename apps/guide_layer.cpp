@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "guide_layer.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <filesystem>
 #include <span>
 
+#include "core/error.h"
 #include "denoising/denoise.h"
+#include "metrics/alignment.h"
 
 namespace covary {
 namespace {
@@ -51,6 +55,18 @@ Image checked_guide(const std::string& path, const std::string& layer) {
   return guide;
 }
 
+/// The pixels of the image at `path` in a separate file.
+Image guide_from_file(const std::string& path, const ImagePlace& place, const std::string& file) {
+  PlacedImage guide = read_image(file);
+  const CropWindow common = common_window(path, place, place.window, file, guide.place);
+  if (!(common == place.window))
+    throw Error(ErrorCode::kInput, fmt::format("'{}' has the pixels {}; '{}' needs {}", file,
+                                               text_of(guide.place.window), path, text_of(place.window)));
+  Image pixels = cut(std::move(guide), place.window);
+  check_guide(file, pixels);
+  return pixels;
+}
+
 }  // namespace
 
 std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, GuideKind kind) {
@@ -65,7 +81,7 @@ std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, 
 Image named_guide(const std::string& path, const ImageInfo& info, const std::string& layer_or_file) {
   const std::vector<std::string> layers = image_layers(info.channels);
   if (std::find(layers.begin(), layers.end(), layer_or_file) != layers.end()) return checked_guide(path, layer_or_file);
-  if (std::filesystem::exists(layer_or_file)) return checked_guide(layer_or_file, "");
+  if (std::filesystem::exists(layer_or_file)) return guide_from_file(path, info.place, layer_or_file);
   return checked_guide(path, layer_or_file);  // the error lists the layers
 }
 

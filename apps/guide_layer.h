@@ -17,8 +17,8 @@ enum class GuideKind { kAlbedo, kNormal, kPosition };
 /// several, the first in the table. Throws like read_image() and check_guide().
 std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, GuideKind kind);
 
-/// A guide named by the user: a layer of the image at `path`, or a separate file. Throws like read_image() and
-/// check_guide().
+/// A guide named by the user: a layer of the image at `path`, or a separate file, whose frame must have the same size;
+/// of a larger data window, the pixels of the image. Throws like read_image(), check_guide() and common_window().
 Image named_guide(const std::string& path, const ImageInfo& info, const std::string& layer_or_file);
 
 }  // namespace covary

@@ -67,7 +67,8 @@ class Input {
             text(film_key::kSettings),
             false,
             !text(film_key::kLightPaths).empty(),
-            !text(film_key::kLight).empty()};
+            !text(film_key::kLight).empty(),
+            true};
   }
 
  private:

@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <limits>
+#include <memory>
 
 #include "combine/difference_checks.h"
 #include "combine/light_film.h"
+#include "combine/same_seed.h"
 #include "core/error.h"
 #include "core/memory_limit.h"
 #include "core/stopwatch.h"
@@ -147,6 +149,49 @@ Band band_around(const CombineRequest& request, int first, int last) {
   return {rows_of(request.crn, begin, n), request.independent.rows(begin, n), begin};
 }
 
+namespace {
+
+/// The groups that may have been rendered with the same seed; those of a film have different samples.
+int groups_with_seeds(const std::optional<GroupedSource>& source) {
+  return source && !source->origin.is_one_film ? source->groups : 0;
+}
+
+void check_denoised(const ImageOrigin& origin, int groups, std::vector<Finding>& findings) {
+  if (origin.denoised.empty() || groups < 2) return;
+  findings.push_back(
+      {Finding::Severity::kError,
+       fmt::format("{} is denoised already ({}): what is left of the noise does not tell its error; give "
+                   "the renders before denoising",
+                   origin.name, origin.denoised)});
+}
+
+void report(const std::vector<StrayValue>& strays, const char* name, std::vector<Finding>& findings) {
+  if (strays.empty()) return;
+  const StrayValue& s = strays.front();
+  findings.push_back(
+      {Finding::Severity::kWarning,
+       fmt::format("{}: {} value{} that outshine{} the whole picture {:.0f} times {} left out, "
+                   "the largest of {:.3g} at ({}, {}) in render {}; find the cause in the renderer",
+                   name, strays.size(), strays.size() == 1 ? "" : "s", strays.size() == 1 ? "s" : "", kMostOfPicture,
+                   strays.size() == 1 ? "is" : "are", s.brightness, s.x, s.y, s.group + 1)});
+}
+
+/// The source with these values set to NaN.
+GroupedSource without(const GroupedSource& source, const std::vector<StrayValue>& strays) {
+  if (strays.empty()) return source;
+  GroupedSource result = source;
+  result.rows = [rows = source.rows, strays, data = std::make_shared<std::vector<float>>()](int first, int n) {
+    GroupedImage image = rows(first, n);
+    data->assign(image.data, image.pixel(0, n));
+    leave_out(strays, first, n, image.width, image.groups, data->data());
+    image.data = data->data();
+    return image;
+  };
+  return result;
+}
+
+}  // namespace
+
 InputFindings examine(const CombineRequest& request) {
   const GroupedSource& independent = request.independent;
   const ImageOrigin& crn_origin = request.crn ? request.crn->origin : independent.origin;
@@ -157,6 +202,11 @@ InputFindings examine(const CombineRequest& request) {
   // Only for images of other renderers: covary's films say how they were made.
   const bool by_others = !request.crn && independent.origin.sampling.empty();
   DifferenceChecks differences(independent.width, independent.height, by_others ? independent.groups : 0);
+  if (request.crn) check_denoised(crn_origin, request.crn->groups, inputs.findings);
+  check_denoised(independent.origin, independent.groups, inputs.findings);
+  SameSeedChecks crn_seeds(independent.width, independent.height, groups_with_seeds(request.crn));
+  SameSeedChecks seeds(independent.width, independent.height, groups_with_seeds(independent));
+  StrayValues of_crn, of_independent;
   const int step = std::max(kFewestRows, rows_in_memory(request));
   bool checkable = true;
   for (int y = 0; y < independent.height && checkable; y += step) {
@@ -165,9 +215,15 @@ InputFindings examine(const CombineRequest& request) {
     checkable = !request.estimator.adaptive || (!lacks_samples(g) && !lacks_samples(h));
     if (checkable) checks.add_rows(g, h);
     differences.add_rows(h);
+    crn_seeds.add_rows(g), seeds.add_rows(h);
+    of_crn.add_rows(g), of_independent.add_rows(h);
   }
   inputs.report = checkable ? checks.report() : unchecked_report();
+  crn_seeds.report("CRN", inputs.report.findings), seeds.report("independent image", inputs.report.findings);
   if (errors_text(inputs.report.findings).empty()) differences.report(inputs.report.findings);
+  inputs.strays_of_crn = of_crn.found(), inputs.strays = of_independent.found();
+  report(inputs.strays_of_crn, "CRN", inputs.report.findings);
+  report(inputs.strays, "independent image", inputs.report.findings);
   inputs.findings.insert(inputs.findings.end(), inputs.report.findings.begin(), inputs.report.findings.end());
   return inputs;
 }
@@ -190,14 +246,17 @@ void finish(EstimatorResult& result, const GroupedImage* light) {
   add_risk_of_light(before, result);
 }
 
-CombinedImage combine(const CombineRequest& request) {
+CombinedImage combine(const CombineRequest& given) {
   CombinedImage combined;
-  combined.planned_memory = planned_memory(request);
-  check_memory(request, combined.planned_memory);
+  combined.planned_memory = planned_memory(given);
+  check_memory(given, combined.planned_memory);
   Stopwatch watch;
-  combined.inputs = examine(request);
-  if (request.checked) request.checked(combined.inputs);
-  if (!request.force) throw_errors(combined.inputs);
+  combined.inputs = examine(given);
+  if (given.checked) given.checked(combined.inputs);
+  if (!given.force) throw_errors(combined.inputs);
+  CombineRequest request = given;
+  if (request.crn) request.crn = without(*request.crn, combined.inputs.strays_of_crn);
+  request.independent = without(request.independent, combined.inputs.strays);
   combined.check_seconds = watch.lap();
 
   combined.image = request.layers.empty() ? estimate(request) : estimate_layers(request, combined.layers);

@@ -14,6 +14,7 @@
 #include "combine/input_checks.h"
 #include "combine/layer_sources.h"
 #include "estimators/estimator.h"
+#include "filters/stray_values.h"
 #include "risk/predicted_error.h"
 
 namespace covary {
@@ -21,7 +22,8 @@ namespace covary {
 /// What is known about the inputs before estimation.
 struct InputFindings {
   InputReport report;
-  std::vector<Finding> findings;  ///< of the report, and from the images' own attributes
+  std::vector<Finding> findings;                  ///< of the report, and from the images' own attributes
+  std::vector<StrayValue> strays_of_crn, strays;  ///< of both images: values that are left out
 };
 
 struct CombineRequest {

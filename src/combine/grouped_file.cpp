@@ -11,6 +11,7 @@
 
 #include "core/error.h"
 #include "core/number_text.h"
+#include "film/denoised_by.h"
 #include "film/image_file.h"
 #include "film/splat_layer.h"
 
@@ -145,6 +146,8 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
       read.push_back(channel);
     }
   file.check(read);
+  if (denoised_.empty() && attribute(file, "covary:film").empty())
+    denoised_ = denoised_by(file.attributes(), file.channels(), layer);
   take_film_facts(path, file, only_file && (numbered.size() > 1 || layer.empty()));
 }
 
@@ -157,6 +160,7 @@ void GroupedFile::take_film_facts(const std::string& path, const ExrFile& file, 
   samples_ += samples;
   const ExrFile::Channel* counts = file.find(kCounts);
   const bool is_film = may_be_film && !attribute(file, "covary:film").empty();
+  is_one_film_ = is_film;
   has_counts_ = is_film && counts && counts->type == "uint";
   has_variance_ = has_counts_ && file.find(std::string(kVariance) + ".R");
   if (has_counts_) file.check({{kCounts}});

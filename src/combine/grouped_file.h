@@ -45,6 +45,10 @@ class GroupedFile {
   /// A light film (film/splat_layer.h); an image to which one was added.
   bool is_light_film() const { return !light_paths_per_sample_.empty(); }
   bool has_light_added() const { return !light_film_.empty(); }
+  /// Whether all groups are of one film of covary.
+  bool is_one_film() const { return is_one_film_; }
+  /// denoised_by() of the first such file; "" for films.
+  const std::string& denoised() const { return denoised_; }
   /// Whether any channel has only 16 bits.
   bool has_half() const { return has_half_; }
   /// For messages.
@@ -76,8 +80,8 @@ class GroupedFile {
   std::vector<Group> groups_;
   ImagePlace place_;
   double samples_ = 0, samples_of_group_ = 0;
-  std::string sampling_, scene_hash_, settings_, light_paths_per_sample_, light_film_, name_;
-  bool has_half_ = false, has_counts_ = false, has_variance_ = false;
+  std::string sampling_, scene_hash_, settings_, light_paths_per_sample_, light_film_, name_, denoised_;
+  bool has_half_ = false, has_counts_ = false, has_variance_ = false, is_one_film_ = false;
   std::unique_ptr<ExrFile> counts_file_;
   std::string counts_path_, counts_channel_;
   uint32_t count_of_all_ = 0;

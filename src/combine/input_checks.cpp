@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "film/groups.h"
+#include "filters/planes.h"
 
 namespace covary {
 namespace {
@@ -22,6 +23,7 @@ constexpr double kMinCrnCorrelation = 0.02;
 constexpr double kMaxSigmas = 8;  // for t with about 11 degrees of freedom: false-alarm rate below 1e-5
 constexpr long kMaxPairs = 250000;
 constexpr long kFewPairs = 200;
+constexpr double kMostLeftOut = 0.01;  // of the pixels
 
 float grey(const float* rgb) { return (rgb[0] + rgb[1] + rgb[2]) * (1.0f / 3.0f); }
 
@@ -32,7 +34,7 @@ bool centred_ranks(const GroupedImage& image, int x, int y, std::vector<float>& 
   for (int t = 0; t < T; ++t) values[t] = grey(p + 3 * t);
   bool varies = false;
   for (int t = 0; t < T; ++t) {
-    if (!std::isfinite(values[t])) return false;
+    if (!is_usable(values[t])) return false;
     int below = 0, equal = 0;
     for (int s = 0; s < T; ++s) {
       below += values[s] < values[t];
@@ -103,7 +105,7 @@ void add_values(const GroupedImage& image, int first_row, Values& v) {
       const float* p = image.pixel(x, y);
       bool nonfinite = false, negative = false, clipped = true;
       for (int i = 0; i < 3 * image.groups; ++i) {
-        if (!std::isfinite(p[i])) {
+        if (!is_usable(p[i])) {
           if (v.bad_x < 0) v.bad_x = x, v.bad_y = first_row + y, v.bad_group = i / 3;
           nonfinite = true;
         }
@@ -136,13 +138,13 @@ void finish(Values& v, long pixels) {
 }
 
 void check_values(const char* name, long pixels, const Values& v, std::vector<Finding>& findings) {
-  const size_t groups = v.group_means.size();
   if (v.nonfinite)
     findings.push_back(
-        {Severity::kError,
-         fmt::format("{}: {} of {} pixels hold NaN or infinite values, the first at ({}, {}) in group {}; "
-                     "find the cause in the renderer, or leave such samples out there",
-                     name, v.nonfinite, pixels, v.bad_x, v.bad_y, v.bad_group)});
+        {v.nonfinite > kMostLeftOut * static_cast<double>(pixels) ? Severity::kError : Severity::kWarning,
+         fmt::format(
+             "{}: {} of {} pixels hold NaN, infinite or overflowing values, the first at ({}, {}) in render {}; "
+             "these values are left out; find the cause in the renderer",
+             name, v.nonfinite, pixels, v.bad_x, v.bad_y, v.bad_group + 1)});
   if (v.negative)
     findings.push_back({Severity::kWarning,
                         fmt::format("{}: {} of {} pixels hold negative values; spectral renderers make them of colours "
@@ -155,16 +157,6 @@ void check_values(const char* name, long pixels, const Values& v, std::vector<Fi
          fmt::format("{}: {} of {} pixels are exactly 1 in all groups and channels: values are clipped; save "
                      "linear, unclipped 32-bit float values (not PNG, no tone mapping)",
                      name, v.clipped, pixels)});
-  for (size_t a = 0; a < groups; ++a)
-    for (size_t b = a + 1; b < groups; ++b)
-      if (v.group_means[a] == v.group_means[b] && v.variance_of_mean > 0) {
-        findings.push_back(
-            {Severity::kError,
-             fmt::format("{}: groups {} and {} are identical: the same seed was rendered twice; give every "
-                         "group its own seed",
-                         name, a, b)});
-        return;
-      }
 }
 
 std::string signed_value(const Correlation& c) { return fmt::format("{:+.3f} (± {:.3f})", c.value, c.standard_error); }
@@ -304,14 +296,7 @@ InputReport InputChecks::report() const {
   r.clipped_pixels = crn.clipped + independent.clipped;
   if (s.has_crn()) check_values("CRN", pixels, crn, r.findings);
   check_values("independent image", pixels, independent, r.findings);
-  if (!s.has_crn()) {
-    const bool identical = independent.group_means.size() > 1 && independent.variance_of_mean == 0;
-    if (identical && independent.mean > 0)
-      r.findings.push_back({Severity::kError,
-                            "independent image: all groups are identical: the same seed was rendered twice, or there "
-                            "is no noise to remove; give every render its own seed"});
-    return r;
-  }
+  if (!s.has_crn()) return r;
 
   const auto is_black = [](const Values& v) { return v.mean == 0 && v.negative == 0 && v.nonfinite == 0; };
   if (is_black(crn) && is_black(independent))

@@ -24,6 +24,8 @@ struct ImageOrigin {
   bool has_half = false;             ///< a channel has only 16 bits
   bool is_light_film = false;        ///< film/splat_layer.h
   bool has_light_added = false;      ///< an image to which a light film was added
+  bool is_one_film = false;          ///< all groups are of one film of covary, and so of different samples
+  std::string denoised;              ///< denoised_by() of film/denoised_by.h
 };
 
 /// Appends to `findings` what in the origins argues against combining the images. Throws Error(kInput) if they do not

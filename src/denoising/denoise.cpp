@@ -19,6 +19,7 @@
 
 #include "core/detached_work.h"
 #include "core/error.h"
+#include "filters/stray_values.h"
 
 namespace covary {
 namespace {
@@ -279,7 +280,7 @@ Image Denoiser::denoise(const Image& rgb, const Image* albedo, const Image* norm
   check_images(rgb, albedo, normal);
   const auto run = std::make_shared<Run>();
   run->library = library_, run->hdr = true, run->clean_guides = clean_guides && albedo;
-  run->inputs.emplace_back("color", finite(rgb));
+  run->inputs.emplace_back("color", with_usable_values(rgb));
   if (albedo) run->inputs.emplace_back("albedo", finite(*albedo));
   if (normal) run->inputs.emplace_back("normal", finite(*normal));
   ++runs_;

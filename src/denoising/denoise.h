@@ -33,7 +33,8 @@ class Denoiser {
 
   /// Denoises `rgb` (linear, 3 channels, high dynamic range) on the CPU. `albedo` in [0, 1] and `normal` in [-1, 1] are
   /// guides that preserve texture and edges: 3 channels, the same size, or null; the normal only together with the
-  /// albedo. They may be noisy unless `clean_guides` is set. Non-finite values are set to zero first. Throws
+  /// albedo. They may be noisy unless `clean_guides` is set. Values of `rgb` that cannot be used are replaced first
+  /// (filters/stray_values.h), those of guides that are not finite set to zero. Throws
   /// Error(kInput) if sizes differ, and Error(kIo) if the library fails. Inside run_stoppable() it returns at once when
   /// stopped; the library's own work ends in the background at its next step (core/detached_work.h).
   Image denoise(const Image& rgb, const Image* albedo, const Image* normal, bool clean_guides = false);

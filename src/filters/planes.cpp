@@ -20,20 +20,21 @@ Planes::Planes(int width, int height, int count, int border, float value)
 
 namespace {
 
-/// Whether no value has the exponent of infinity and NaN. Integer arithmetic, which can be vectorised in any order.
-bool all_finite(const float* values, size_t n) {
-  constexpr uint32_t kExponent = 0x7f800000;
+/// Whether all values are usable: infinity and NaN have the largest exponent. Integer arithmetic, which can be
+/// vectorised in any order.
+bool all_usable(const float* values, size_t n) {
+  constexpr uint32_t kExponent = 0x7f800000, kLimit = std::bit_cast<uint32_t>(kTooLarge);
   uint32_t bad = 0;
-  for (size_t i = 0; i < n; ++i) bad |= (std::bit_cast<uint32_t>(values[i]) & kExponent) == kExponent;
+  for (size_t i = 0; i < n; ++i) bad |= (std::bit_cast<uint32_t>(values[i]) & kExponent) >= kLimit;
   return bad == 0;
 }
 
-/// Whether n consecutive pixels are finite in both images.
-bool all_finite(const GroupedImage& a, const GroupedImage& b, int x, int y, int n) {
-  const auto are_finite = [&](const GroupedImage& image) {
-    return all_finite(image.pixel(x, y), static_cast<size_t>(n) * 3 * image.groups);
+/// Whether n consecutive pixels are usable in both images.
+bool all_usable(const GroupedImage& a, const GroupedImage& b, int x, int y, int n) {
+  const auto are_usable = [&](const GroupedImage& image) {
+    return all_usable(image.pixel(x, y), static_cast<size_t>(n) * 3 * image.groups);
   };
-  return are_finite(a) && (b.data == a.data || are_finite(b));
+  return are_usable(a) && (b.data == a.data || are_usable(b));
 }
 
 }  // namespace
@@ -42,10 +43,10 @@ std::vector<unsigned char> finite_pixels(const GroupedImage& a, const GroupedIma
   std::vector<unsigned char> valid(static_cast<size_t>(a.width) * a.height, 1);
   std::atomic<long> bad{0};
   parallel_for(a.height, 8, [&](int y) {
-    if (all_finite(a, b, 0, y, a.width)) return;
+    if (all_usable(a, b, 0, y, a.width)) return;
     long bad_in_row = 0;
     for (int x = 0; x < a.width; ++x) {
-      if (all_finite(a, b, x, y, 1)) continue;
+      if (all_usable(a, b, x, y, 1)) continue;
       valid[static_cast<size_t>(y) * a.width + x] = 0;
       ++bad_in_row;
     }
@@ -143,6 +144,20 @@ Moments moments(const GroupedImage& image, const std::vector<unsigned char>& val
   return m;
 }
 
+namespace {
+
+/// The mean of `image` over the valid pixels of the square of 5 x 5 around (x, y), channel c; 0 if there are none.
+float mean_around(const Image& image, const std::vector<unsigned char>& valid, int x, int y, int c) {
+  double sum = 0;
+  int n = 0;
+  for (int j = std::max(0, y - 2); j <= std::min(image.height - 1, y + 2); ++j)
+    for (int i = std::max(0, x - 2); i <= std::min(image.width - 1, x + 2); ++i)
+      if (valid[static_cast<size_t>(j) * image.width + i]) sum += image.pixel(i, j)[c], ++n;
+  return n ? static_cast<float>(sum / n) : 0.0f;
+}
+
+}  // namespace
+
 void fill_invalid(const GroupedImage& a, const GroupedImage& b, const std::vector<unsigned char>& valid,
                   Image& result) {
   for (int y = 0; y < a.height; ++y)
@@ -154,11 +169,11 @@ void fill_invalid(const GroupedImage& a, const GroupedImage& b, const std::vecto
         for (const GroupedImage* image : {&a, &b})
           for (int t = 0; t < image->groups; ++t) {
             const float v = image->pixel(x, y)[3 * t + c];
-            if (!std::isfinite(v)) continue;
+            if (!is_usable(v)) continue;
             sum += v;
             ++n;
           }
-        result.pixel(x, y)[c] = n ? static_cast<float>(sum / n) : 0.0f;
+        result.pixel(x, y)[c] = n ? static_cast<float>(sum / n) : mean_around(result, valid, x, y, c);
       }
     }
 }

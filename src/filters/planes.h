@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -61,14 +62,19 @@ struct Moments {
   std::optional<Planes> relative_count;
 };
 
-/// 1 for pixels whose values are all finite in both images, otherwise 0.
+/// Values from here on are left out like those that are not finite: the sums of their squares could exceed a float.
+inline constexpr float kTooLarge = 0x1p50f;                                 // 1.1e15
+inline bool is_usable(float value) { return std::abs(value) < kTooLarge; }  // false for NaN
+
+/// 1 for pixels whose values are all usable in both images, otherwise 0.
 std::vector<unsigned char> finite_pixels(const GroupedImage& a, const GroupedImage& b, long& n_nonfinite);
 
 /// Moments of `image` from the groups first, first + step, first + 2 step, …
 Moments moments(const GroupedImage& image, const std::vector<unsigned char>& valid, int border, float outside,
                 int first = 0, int step = 1);
 
-/// Sets every invalid pixel of `result` to the mean of the finite groups of both images, or zero.
+/// Sets every invalid pixel of `result` to the mean of the usable groups of both images, or else of the valid pixels of
+/// `result` in the surrounding 5 x 5, or zero.
 void fill_invalid(const GroupedImage& a, const GroupedImage& b, const std::vector<unsigned char>& valid, Image& result);
 
 /// Offsets in the window x window square around a pixel, from the centre outwards: by squared distance, then row, then

@@ -9,6 +9,7 @@
 #include <set>
 #include <sstream>
 
+#include "film/denoised_by.h"
 #include "film/outputs.h"
 #include "film/splat_layer.h"
 
@@ -91,8 +92,7 @@ std::vector<std::string> image_warnings(const ImageFacts& image) {
 std::vector<std::string> reference_warnings(const ImageFacts& image, const ImageFacts& reference) {
   if (is_same_file(image.path, reference.path)) return {};
   std::vector<std::string> warnings;
-  const bool mixed = attribute(reference, "estimator").find("--denoise") != std::string::npos;
-  if (mixed || !attribute(reference, "denoiser").empty())
+  if (!denoised_by(reference.info.attributes, reference.info.channels).empty())
     warnings.push_back(reference.name + " is denoised, and so biased: it cannot be a reference for errors");
   const double samples = samples_of(image), of_reference = samples_of(reference);
   if (of_reference > 0 && of_reference <= samples)

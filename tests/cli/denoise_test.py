@@ -161,8 +161,8 @@ class Denoise(RenderTest):
         self.bad(2, "--mode error needs a second render of another seed", "denoise", "plain.exr", "-o", "e.exr",
                  "--mode", "error")
         (self.path / "copy.exr").write_bytes((self.path / "plain.exr").read_bytes())
-        self.bad(1, "all groups are identical: the same seed was rendered twice", "denoise", "plain.exr", "copy.exr",
-                 "-o", "e.exr", *PLAIN)
+        self.bad(1, "renders 1 and 2 are identical: the same seed was rendered twice", "denoise", "plain.exr",
+                 "copy.exr", "-o", "e.exr", *PLAIN)
 
     def test_positions(self):
         """Guide filters, from films and from files of guides."""
@@ -271,8 +271,18 @@ class Denoise(RenderTest):
         self.assertIn("guided by albedo and normal", said)
         self.bad(1, "no layer 'albdo'; did you mean 'albedo'?", *two, "--albedo", "albdo")
         self.write("small.exr", exr({c: [0.5] * 6 for c in "RGB"}, (3, 2)))
-        self.bad(1, "'small.exr' has 3 x 2 pixels, 'mitsuba0.exr' 48 x 32", *two, "--albedo", "small.exr")
+        self.bad(1, "mitsuba0.exr has a frame of 48 x 32 pixels, small.exr one of 3 x 2", *two, "--albedo", "small.exr")
         self.bad(2, "--albedo and --normal have no effect with --no-guides", *two, "--no-guides", "--albedo", "x")
+        # A larger data window in a frame of the same size, and one that lacks pixels.
+        self.good(*two, "--albedo", "albedo.exr", "--normal", "sh_normal")
+        placed = (self.path / "a.exr").read_bytes()
+        wide = [v for y in range(32) for v in (9.0, *albedo[48 * y:48 * y + 48], 9.0)]
+        self.write("wide.exr", exr({c: wide for c in "RGB"}, size, window=(-1, 0, 50, 32)))
+        self.good(*two, "--albedo", "wide.exr", "--normal", "sh_normal")
+        self.assertEqual(read_exr((self.path / "a.exr").read_bytes()), read_exr(placed))
+        self.write("part.exr", exr({c: albedo for c in "RGB"}, size, window=(4, 0, 48, 32)))
+        self.bad(1, "'part.exr' has the pixels 48 x 32 at (4, 0); 'mitsuba0.exr' needs 48 x 32 at (0, 0)", *two,
+                 "--albedo", "part.exr")
 
     def test_layers_add_up(self):
         """Of two renders, with and without a network, by covary denoise and combine."""
@@ -358,9 +368,47 @@ class Denoise(RenderTest):
         self.bad(1, "they were denoised before", "denoise", "smooth0.exr", "smooth1.exr", *out)
         forced = self.good("denoise", "smooth0.exr", "smooth1.exr", *out, "--force").stderr
         self.assertRegex(forced, "warning: .*they were denoised before")
+        self.write("near.exr", grey([v * (1 + 1e-6 * (i % 5)) for i, v in enumerate(first)]))
+        self.bad(1, "renders 1 and 2 have the same noise: the same seed was rendered twice", "denoise", "a.exr",
+                 "near.exr", *out)
+        # Of covary by their attributes, of Cycles by its layer.
+        self.good("denoise", "b.exr", "a.exr", "-o", "other.exr", *PLAIN)
+        self.bad(1, "out.exr … other.exr is denoised already (none --denoise auto --oidn off)", "denoise", "out.exr",
+                 "other.exr", "-o", "again.exr", *PLAIN)
+        for name, values in (("x", first), ("y", second)):
+            self.write(f"{name}.exr", exr({f"ViewLayer.{layer}.{c}": values for layer in ("Combined", "Noisy Image")
+                                           for c in "RGB"}, size))
+        self.bad(1, "is denoised already (by Cycles", "denoise", "x.exr", "y.exr", "-o", "again.exr", *PLAIN)
         for name, samples in (("few", "16"), ("many", "64")):
             self.write(f"{name}.exr", grey(first, attributes={"cycles.ViewLayer.samples": samples}))
         self.bad(1, "has 64 samples per pixel, the group before it 16", "denoise", "few.exr", "many.exr", *out)
+
+    def test_values_that_cannot_be_used(self):
+        """Of one render or both; what is left has the error that it has without them."""
+        noise, (width, height) = exponential_noise(8), (96, 64)
+        truth = [1 + 0.5 * math.sin(0.2 * (i % width)) for i in range(width * height)]
+        renders = [[value * noise() for value in truth] for _ in range(2)]
+        at = 30 * width + 40
+        far = [i for i in range(width * height) if abs(i % width - 40) > 3 or abs(i // width - 30) > 3]
+
+        def error(*bad):
+            for name, values, value in zip("ab", renders, bad, strict=True):
+                values = values if value is None else [*values[:at], value, *values[at + 1:]]
+                self.write(f"{name}.exr", exr({c: values for c in "RGB"}, (width, height)))
+            said = self.good("denoise", "a.exr", "b.exr", "-o", "out.exr", *PLAIN).stderr
+            image = read_exr((self.path / "out.exr").read_bytes())
+            self.assertLess(image["R"][at], 100)
+            return said, sum((image["R"][i] - truth[i]) ** 2 for i in far) / len(far)
+
+        _, usual = error(None, None)
+        for value in (3e8, 1e9, 1e15, 1e19, 1e30, 3e38, math.inf, math.nan):
+            for bad in ((value, None), (None, value), (value, value)):
+                if bad[0] == bad[1] and 1 < value < 1e16:
+                    continue  # both confirm it
+                said, left = error(*bad)
+                self.assertRegex(said, r"warning: independent image: 1 .* at \(40, 30\) in render [12]", bad)
+                self.assertLess(abs(left / usual - 1), 0.05, bad)
+                self.assertRegex(said, r"predicted relMSE 0\.0\d+,", bad)
 
     def test_few_samples_of_a_single_pass(self):
         options = ("--estimator", "none", "--denoise", "error", *PLAIN)
