@@ -34,6 +34,8 @@ struct RiskRow {
   double light = 0;                                  ///< light in the groups, over G' + 0.1
   double light_of_largest = 0;                       ///< light in the largest group of each pixel, likewise
   double squared_deviations = 0, fourth_powers = 0;  ///< of group means: squared variance, and fourth moment
+  /// (M - h)^2 - v where M is ten times as bright as h at the pixel and around it, over that brightness squared
+  double spread = 0;
   double values = 0, parts = 0;
   double predicted = 0;  ///< from the standard error, before apply_interval(), which sets it
   double groups = 0;     ///< number per pixel; not a sum
@@ -52,6 +54,7 @@ inline constexpr std::pair<const char*, double RiskRow::*> kRiskSums[] = {
     {"light_of_largest", &RiskRow::light_of_largest},
     {"squared_deviations", &RiskRow::squared_deviations},
     {"fourth_powers", &RiskRow::fourth_powers},
+    {"spread", &RiskRow::spread},
     {"predicted", &RiskRow::predicted},
     {"values", &RiskRow::values},
     {"parts", &RiskRow::parts},
@@ -98,8 +101,8 @@ struct EstimatorResult {
   /// For animation frames: means of both halves of the samples of this and previous frames, for the next frame
   /// (denoising/history.h); empty if not requested.
   std::vector<Image> kept_samples;
-  /// Pixels with a non-finite value in either input. They are ignored everywhere else, and set to the mean of their
-  /// finite groups, or zero if there are none.
+  /// Pixels with a value in either input that is not usable (filters/planes.h). They are ignored everywhere else, and
+  /// set to the mean of their usable groups, or else of the pixels around.
   long nonfinite_pixels = 0;
   /// One per row, for calibrate() of risk/held_out_error.h; empty if nothing was held out.
   std::vector<HeldOutRow> held_out;

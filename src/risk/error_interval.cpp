@@ -72,6 +72,9 @@ const FittedErrors& fit_of(ErrorKind kind, double groups) {
   return kFittedErrors[static_cast<size_t>(kind)];
 }
 
+/// Whether few pixels hold most of the noise.
+bool hold_most_noise(const RiskRow& sums) { return sums.noise * sums.noise < kFewestPixels * sums.noise_squares; }
+
 double share_of_largest(const RiskRow& sums) { return sums.light > 0 ? sums.light_of_largest / sums.light : 1; }
 
 }  // namespace
@@ -114,7 +117,8 @@ std::string unknown_error(const RiskRow& sums, ErrorKind kind, const LogError& e
   if (sums.groups < kFewestGroups && !fitted_to_few(kind))
     return fmt::format("{:.0f} groups of samples are too few; {} are needed", sums.groups, kFewestGroups);
   const double n = sums.noise * sums.noise / sums.noise_squares, pixels = sums.values / 3;
-  if (n < kFewestPixels) return fmt::format("{:.0f} of {:.0f} pixels hold most of the noise", std::max(1.0, n), pixels);
+  if (hold_most_noise(sums))
+    return fmt::format("{:.0f} of {:.0f} pixels hold most of the noise", std::max(1.0, n), pixels);
   if (has_rare_light(sums))
     return fmt::format("{:.0f} % of the light is in one of {:.0f} groups of each pixel", 100 * share_of_largest(sums),
                        sums.groups);
@@ -124,6 +128,27 @@ std::string unknown_error(const RiskRow& sums, ErrorKind kind, const LogError& e
     return "few samples hold most of the light";
   return "";
 }
+
+namespace {
+
+/// The fireflies, and their light in other pixels, if they alone would make the error far larger than predicted: then
+/// nothing is known.
+void take_fireflies(EstimatorResult& result) {
+  const RiskRow& sums = *result.risk_sums;
+  const Fireflies fireflies = fireflies_in(result);
+  const double spread = hold_most_noise(sums) ? sums.spread / sums.values : 0;
+  const double own = predicted_relmse(result), hidden = std::max(fireflies.relmse, spread);
+  if (!(hidden > kMostFactor * own * result.interval->middle)) return;
+  std::string unknown = result.interval->unknown;
+  if (unknown.empty() || fireflies.relmse > spread)
+    unknown = fmt::format(
+        "{} pixels are more than {:.0f} times as bright as those around, by few samples: they may be fireflies",
+        fireflies.pixels, kFireflyFactor);
+  result.interval = ErrorInterval{hidden / own, 1, 1, unknown};
+  result.risks.reset();  // they are relative to the fireflies, too
+}
+
+}  // namespace
 
 void apply_interval(EstimatorResult& result) {
   if (result.risk_rows.empty()) return;
@@ -143,6 +168,7 @@ void apply_interval(EstimatorResult& result) {
   if (result.risks) scale_candidates(*result.risks, middle, sums.variance / (sums.values * std::exp(error.middle)));
   result.interval = ErrorInterval{scaled ? 1 : middle, std::exp(error.low - error.middle),
                                   std::exp(error.high - error.middle), unknown_error(sums, result.risk_kind, error)};
+  take_fireflies(result);
 }
 
 }  // namespace covary

@@ -7,7 +7,8 @@
 //
 // r: the standardised residual, with quantiles from scenes left out of the fit; p: 1, but for mixtures 1 - V / v, which
 // is 0 if they equal the mean h, whose error is V. No interval is given if few pixels or single groups hold most of the
-// noise or light, or if the bounds are far apart.
+// noise or light, if the bounds are far apart, or if the image kept fireflies: its error is relative to its own
+// brightness, which hides theirs.
 #pragma once
 
 #include <array>

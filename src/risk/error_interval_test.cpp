@@ -196,6 +196,39 @@ TEST(ErrorInterval, IsNotGivenOfBlackImages) {
   EXPECT_EQ(result.interval->unknown, "its samples do not differ");
 }
 
+TEST(ErrorInterval, IsNotGivenWhereTheImageKeptFireflies) {
+  EstimatorResult result = result_of(known_sums(), ErrorKind::kNetwork);
+  result.estimate = result.std_error = Image(40, 25, 3);
+  std::fill(result.estimate.data.begin(), result.estimate.data.end(), 0.5f);
+  std::fill(result.std_error.data.begin(), result.std_error.data.end(), 0.02f);
+  EstimatorResult without = result;
+  for (const int x : {10, 11}) {
+    std::fill_n(result.estimate.pixel(x, 10), 3, 15000.0f);
+    std::fill_n(result.std_error.pixel(x, 10), 3, 14000.0f);
+  }
+  apply_interval(without), apply_interval(result);
+  EXPECT_EQ(without.interval->unknown, "");
+  EXPECT_EQ(result.interval->unknown,
+            "2 pixels are more than 10 times as bright as those around, by few samples: they may be fireflies");
+  const PredictedError predicted = *predicted_error(result, 64, 0);
+  EXPECT_FALSE(predicted.bounds);
+  EXPECT_NEAR(predicted.relmse, fireflies_in(result).relmse, 1e-6 * predicted.relmse);
+  EXPECT_GT(predicted.relmse, 1e4 * predicted_error(without, 64, 0)->relmse);
+}
+
+TEST(ErrorInterval, TheLightThatAFireflySpreadsCountsWhereFewPixelsHoldTheNoise) {
+  RiskRow sums = known_sums();
+  sums.spread = 100 * sums.values;
+  EstimatorResult result = result_of(sums, ErrorKind::kFilters);
+  apply_interval(result);
+  EXPECT_LT(predicted_error(result, 64, 0)->relmse, 1) << "noise in many pixels may be rare light";
+  sums.noise_squares = sums.noise * sums.noise / 2;
+  result = result_of(sums, ErrorKind::kFilters);
+  apply_interval(result);
+  EXPECT_EQ(result.interval->unknown, "2 of 10000 pixels hold most of the noise");
+  EXPECT_NEAR(predicted_error(result, 64, 0)->relmse, 100, 1e-3);
+}
+
 TEST(ErrorInterval, IsNotReliableBeyondAFactorOfOneAndAHalf) {
   EstimatorResult result = result_of(known_sums(), ErrorKind::kFilters);
   result.interval = ErrorInterval{1, 0.7, 1.49, ""};

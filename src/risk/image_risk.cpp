@@ -76,6 +76,34 @@ void add_groups(const ImageRiskInput& in, int x, int y, double weight, RiskRow& 
   row.light += brightness * light, row.light_of_largest += brightness * largest;
 }
 
+/// RiskRow::spread: light that the image has from elsewhere, such as a firefly's, where the samples show none.
+double spread_at(const ImageRiskInput& in, int x, int y) {
+  constexpr double kBrighter = 10, kDarkest = 0.1;
+  constexpr int kRadius = 2;
+  const int width = in.image->width, height = in.image->height;
+  const auto grey = [&](int i, int j) {
+    double sum = 0;
+    for (int c = 0; c < 3; ++c) sum += in.independent->mean.row(c, j)[i] / 3;
+    return sum;
+  };
+  const float* m = in.image->pixel(x, y);
+  const double own = (double{m[0]} + m[1] + m[2]) / 3;
+  double around = std::max(kDarkest, grey(x, y));
+  if (own <= kBrighter * around) return 0;
+  std::vector<double> values;
+  for (int j = std::max(0, y - kRadius); j <= std::min(height - 1, y + kRadius); ++j)
+    for (int i = std::max(0, x - kRadius); i <= std::min(width - 1, x + kRadius); ++i)
+      if ((*in.valid)[static_cast<size_t>(j) * width + i]) values.push_back(grey(i, j));
+  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  around = std::max(around, *middle);
+  if (own <= kBrighter * around) return 0;
+  double error = 0;
+  for (int c = 0; c < 3; ++c)
+    error += square(m[c] - in.independent->mean.row(c, y)[x]) - in.independent->variance_of_mean.row(c, y)[x];
+  return error / (around * around + 0.01);
+}
+
 RiskRow risk_of_row(const ImageRiskInput& in, int y) {
   const int width = in.image->width;
   RiskRow row;
@@ -90,6 +118,7 @@ RiskRow risk_of_row(const ImageRiskInput& in, int y) {
       row.noise += w * pixel.noise, row.noise_squares += square(w * pixel.noise);
       if (is_specular(in.surfaces, x, y)) row.specular_noise += w * pixel.noise;
       row.values += 3;
+      if (in.halves[0]) row.spread += spread_at(in, x, y);
       add_groups(in, x, y, w, row);
     }
     if (x % kPart != kPart - 1 && x != width - 1) continue;

@@ -87,6 +87,25 @@ TEST(ImageRisk, IsTheSquaredErrorOfAFilteredImageWithItsBias) {
   EXPECT_LT(error, 0.03 * truth / kRuns) << "sees a tenth of the error";
 }
 
+// A flat picture of 0.5 whose image has 100 at one pixel, where the samples have 0.5.
+TEST(ImageRisk, SeesLightThatTheSamplesDoNotHave) {
+  std::vector<float> data(static_cast<size_t>(kWidth) * kHeight * 6, 0.5f);
+  const GroupedImage groups{kWidth, kHeight, 2, data.data()};
+  Image image(kWidth, kHeight, 3);
+  std::fill(image.data.begin(), image.data.end(), 0.5f);
+  const std::vector<unsigned char> valid(static_cast<size_t>(kWidth) * kHeight, 1);
+  const Moments mean = moments(groups, valid, 0, 0.0f);
+  const auto spread = [&] {
+    const Image guide = white();
+    return sum_of(image_risk({&image, {&image, &image}, &mean, {&mean, &mean}, &groups, &guide, &valid})).spread;
+  };
+  EXPECT_EQ(spread(), 0);
+  std::fill_n(image.pixel(10, 20), 3, 4.9f);
+  EXPECT_EQ(spread(), 0) << "less than ten times as bright";
+  std::fill_n(image.pixel(10, 20), 3, 100.0f);
+  EXPECT_NEAR(spread() / (3 * 99.5 * 99.5 / 0.26), 1, 1e-6);
+}
+
 TEST(ImageRisk, KnowsItsOwnScatter) {
   double sum = 0, squares = 0, told = 0;
   for (uint32_t run = 0; run < kRuns; ++run) {

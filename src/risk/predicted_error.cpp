@@ -23,6 +23,10 @@ constexpr double kShareOfBlocks = 0.95;
 constexpr double kFewPixels = 0.01, kMostInFewPixels = 0.4, kMostUncertainty = 0.5, kMostDisagreement = 4;
 constexpr size_t kFewestPixels = 400;
 
+constexpr double kDarkest = 0.1;  // the root of relMSE's 0.01
+
+double square_of(double x) { return x * x; }
+
 /// Sum over the pixels of a part of the image, and their number.
 struct PartSum {
   double total = 0;
@@ -67,6 +71,39 @@ double share_of_few(const EstimatorResult& result) {
   return all > 0 ? std::accumulate(errors.begin(), few, 0.0) / all : 0;
 }
 
+double grey_of(const Image& image, int x, int y) {
+  const float* p = image.pixel(x, y);
+  return (static_cast<double>(p[0]) + p[1] + p[2]) / 3;
+}
+
+/// Mean squared standard error over the channels.
+double squared_error_of(const EstimatorResult& result, int x, int y) {
+  const float* s = result.std_error.pixel(x, y);
+  return (square_of(s[0]) + square_of(s[1]) + square_of(s[2])) / 3;
+}
+
+bool is_known(const EstimatorResult& result, int x, int y) {
+  return square_of(kKnownBrightness) * squared_error_of(result, x, y) <= square_of(grey_of(result.estimate, x, y));
+}
+
+/// See fireflies_in().
+double brightness_around(const EstimatorResult& result, int x, int y) {
+  const Image& image = result.estimate;
+  std::vector<double> values;
+  double least = kDarkest;
+  for (int j = std::max(0, y - 2); j <= std::min(image.height - 1, y + 2); ++j)
+    for (int i = std::max(0, x - 2); i <= std::min(image.width - 1, x + 2); ++i) {
+      const double value = grey_of(image, i, j);
+      if ((i == x && j == y) || !std::isfinite(value)) continue;
+      values.push_back(value);
+      if (is_known(result, i, j)) least = std::max(least, value);
+    }
+  if (values.empty()) return least;
+  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return std::max(least, *middle);
+}
+
 std::optional<PredictedBounds> bounds_around(const EstimatorResult& result, double predicted) {
   if (!result.interval || !result.interval->unknown.empty()) return std::nullopt;
   return PredictedBounds{predicted * result.interval->below, predicted * result.interval->above};
@@ -108,6 +145,23 @@ double predicted_blocks(const EstimatorResult& result) {
   const auto rank = static_cast<ptrdiff_t>(std::ceil(kShareOfBlocks * static_cast<double>(blocks.size()))) - 1;
   std::nth_element(blocks.begin(), blocks.begin() + rank, blocks.end());
   return blocks[static_cast<size_t>(rank)];
+}
+
+Fireflies fireflies_in(const EstimatorResult& result) {
+  sum_over(result, 0, 0, 0, 0);  // throws if there is no standard error
+  const Image& image = result.estimate;
+  Fireflies fireflies;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) {
+      const double own = grey_of(image, x, y), square = squared_error_of(result, x, y);
+      if (!std::isfinite(own + square) || own < kFireflyFactor * kDarkest || is_known(result, x, y)) continue;
+      const double around = brightness_around(result, x, y);
+      if (own < kFireflyFactor * around) continue;
+      ++fireflies.pixels;
+      fireflies.relmse += square / (around * around + 0.01);
+    }
+  fireflies.relmse /= static_cast<double>(image.width) * image.height;
+  return fireflies;
 }
 
 std::optional<PredictedError> predicted_error(const EstimatorResult& result, double samples,

@@ -20,6 +20,19 @@ double predicted_relmse(const EstimatorResult& result);
 /// describes the worst regions.
 double predicted_blocks(const EstimatorResult& result);
 
+/// A pixel is a firefly if it is so many times as bright as those around it, and its standard error is more than
+/// 1 / kKnownBrightness of its brightness.
+inline constexpr double kFireflyFactor = 10, kKnownBrightness = 4;
+
+/// What predicted_relmse() hides: the error of fireflies relative to the brightness around them.
+struct Fireflies {
+  size_t pixels = 0;
+  double relmse = 0;  ///< sum over these pixels, divided by the number of all pixels
+};
+/// The brightness around a pixel is the median of the 24 pixels of a square of 5 x 5, black counting as 0.1, but at
+/// least that of any of them that is known, such as a lamp beside its edge. Throws like predicted_relmse().
+Fireflies fireflies_in(const EstimatorResult& result);
+
 /// Bounds that contain the relMSE in 80 of 100 renders (error_interval.h).
 struct PredictedBounds {
   double low = 0, high = 0;

@@ -88,5 +88,41 @@ TEST(PredictedError, NeedsAStandardError) {
   }
 }
 
+/// A grey image of brightness 0.5 and standard error 0.02.
+EstimatorResult flat_result() {
+  EstimatorResult result;
+  result.estimate = result.std_error = Image(40, 25, 3);
+  std::fill(result.estimate.data.begin(), result.estimate.data.end(), 0.5f);
+  std::fill(result.std_error.data.begin(), result.std_error.data.end(), 0.02f);
+  return result;
+}
+
+void set_pixel(EstimatorResult& result, int x, int y, float value, float error) {
+  std::fill_n(result.estimate.pixel(x, y), 3, value), std::fill_n(result.std_error.pixel(x, y), 3, error);
+}
+
+TEST(PredictedError, FirefliesCountRelativeToWhatIsAround) {
+  EstimatorResult result = flat_result();
+  EXPECT_EQ(fireflies_in(result).pixels, 0u);
+  set_pixel(result, 10, 10, 15000, 14000),
+      set_pixel(result, 11, 10, 15000, 14000);  // adjacent: neither hides the other
+  const Fireflies found = fireflies_in(result);
+  EXPECT_EQ(found.pixels, 2u);
+  EXPECT_NEAR(found.relmse, 2 * 14000.0 * 14000 / 0.26 / 1000, 1e-4 * found.relmse);
+  EXPECT_LT(predicted_relmse(result), 0.01) << "relative to themselves, they count little";
+}
+
+TEST(PredictedError, KnownLampsAndTheirEdgesAreNoFireflies) {
+  EstimatorResult result = flat_result();
+  set_pixel(result, 10, 10, 100, 5);  // known to a twentieth
+  EXPECT_EQ(fireflies_in(result).pixels, 0u);
+  set_pixel(result, 11, 10, 40, 20);  // the lamp's edge
+  EXPECT_EQ(fireflies_in(result).pixels, 0u);
+  set_pixel(result, 30, 10, 4, 2);  // eight times as bright as around
+  EXPECT_EQ(fireflies_in(result).pixels, 0u);
+  set_pixel(result, 30, 10, 6, 3);
+  EXPECT_EQ(fireflies_in(result).pixels, 1u);
+}
+
 }  // namespace
 }  // namespace covary
