@@ -14,6 +14,7 @@
 #include "compare_frames.h"
 #include "comparison_warnings.h"
 #include "declared_options.h"
+#include "denoising/denoised_references.h"
 #include "film/image_rows.h"
 #include "film/image_writer.h"
 #include "film/outputs.h"
@@ -31,7 +32,7 @@ namespace {
 
 /// One image's errors, in the order of the requested metrics.
 struct Comparison {
-  CropWindow window;
+  CropWindow window, of_image;  ///< compared; of the image
   std::vector<MetricResult> results;
   double mean() const { return results[0].mean; }
   double reference_mean() const { return results[0].reference_mean; }
@@ -48,9 +49,27 @@ void require_memory_to_compare(const CompareOptions& options, const std::string&
   if (!options.error_map.empty()) require_image_memory(path, rows.width(), rows.height(), sizeof(float) + kImage);
 }
 
+/// What relative errors against two references are relative to: the named image, or the denoised references.
+std::vector<Image> denominators_of(const CompareOptions& options, std::vector<ImageRows>& references,
+                                   const std::string& path, const ImagePlace& place, const CropWindow& window) {
+  if (references.size() < 2 || !has_relative_metric(options)) return {};
+  const double image = 3 * sizeof(float);
+  require_image_memory(path, window.width, window.height, 2 * image + kBytesOfDenoisedReferences);
+  const auto pixels = [&](ImageRows& file) { return cut({file.place(), file.read_all()}, window); };
+  if (!options.denominator.empty()) {
+    ImageRows file(options.denominator, options.layer);
+    if (!(common_window(path, place, window, options.denominator, file.place()) == window))
+      throw Error(ErrorCode::kInput,
+                  fmt::format("--denominator '{}' does not cover {}", options.denominator, text_of(window)));
+    return {pixels(file)};
+  }
+  return denoised_references(std::vector{pixels(references[0]), pixels(references[1])});
+}
+
 Comparison compare_one(const CompareOptions& options, std::vector<ImageRows>& references, const std::string& path) {
   ImageRows image(path, options.layer);
   Comparison comparison;
+  comparison.of_image = image.place().window;
   comparison.window =
       common_window(path, image.place(), image.place().window, options.reference, references[0].place());
   bool low_dynamic_range = image.low_dynamic_range() && references[0].low_dynamic_range();
@@ -63,6 +82,8 @@ Comparison compare_one(const CompareOptions& options, std::vector<ImageRows>& re
   for (ImageRows& reference : references) files.push_back(&reference);
   ComparedFiles rows(files, comparison.window);
   require_memory_to_compare(options, path, rows, files.size());
+  const std::vector<Image> denominators = denominators_of(options, references, path, image.place(), comparison.window);
+  rows.set_denominators(denominators);
   for (const std::string& name : options.metrics) {
     const bool with_map = comparison.results.empty() && !options.error_map.empty();
     try {
@@ -86,9 +107,25 @@ nlohmann::ordered_json json_of(const CompareOptions& options, const std::string&
   object["non_finite_pixels"] = c.results[0].n_non_finite;
   object["mean"] = c.mean();
   object["reference_mean"] = c.reference_mean();
-  for (size_t m = 0; m < options.metrics.size(); ++m) object[options.metrics[m]] = c.results[m].value;
+  for (size_t m = 0; m < options.metrics.size(); ++m) {
+    object[options.metrics[m]] = c.results[m].value;
+    if (c.results[m].reference_error > 0)
+      object[options.metrics[m] + "_reference_error"] = c.results[m].reference_error;
+  }
   object["warnings"] = warnings;
   return object;
+}
+
+/// Of errors that the references' noise makes uncertain.
+std::vector<std::string> noise_warnings(const CompareOptions& options, const std::string& path, const Comparison& c) {
+  std::vector<std::string> warnings;
+  for (size_t m = 0; m < options.metrics.size(); ++m)
+    if (const MetricResult& r = c.results[m]; r.reference_error > kMostReferenceNoise * std::abs(r.value))
+      warnings.push_back(
+          fmt::format("{}: the noise of the references makes the {} of {:.3g} uncertain by ±{:.2g}; "
+                      "references with more samples would tell more",
+                      path, options.metrics[m], r.value, r.reference_error));
+  return warnings;
 }
 
 std::string ratio_text(double mean, double reference_mean) {
@@ -102,7 +139,7 @@ void print_table(const CompareOptions& options, const std::vector<Comparison>& c
   for (const std::string& path : options.images) width = std::max(width, path.size());
   for (const std::string& name : options.metrics) {
     const MetricInfo& info = find_metric(name);
-    fmt::print("{} = {}\n", name, options.reference2.empty() ? info.formula : info.formula_two);
+    fmt::print("{} = {}\n", name, formula_text(options, info));
   }
   fmt::print("{:{}}", "image", width);
   for (const std::string& name : options.metrics) fmt::print("  {:>12}", name);
@@ -156,6 +193,8 @@ void check_options(const CompareOptions& options) {
     if (std::count(options.metrics.begin(), options.metrics.end(), name) > 1)
       usage("--metric names '" + name + "' more than once");
   }
+  if (!options.denominator.empty() && (options.reference2.empty() || !has_relative_metric(options)))
+    usage("--denominator is an option of relmse and relmse-trimmed with --reference2");
   if (!options.error_range.empty()) {
     if (options.error_map.empty()) usage("--error-range needs --error-map");
     const bool positive = options.metrics[0] == "flip" || options.error_range[0] > 0;
@@ -171,7 +210,8 @@ void check_files(const CompareOptions& options) {
   if (options.json) outputs.writes("--json", *options.json, OutputKind::kText);
   outputs.reads(options.images);
   outputs.reads(options.reference);
-  if (!options.reference2.empty()) outputs.reads(options.reference2);
+  for (const std::string& path : {options.reference2, options.denominator})
+    if (!path.empty()) outputs.reads(path);
   if (options.error_map.empty()) return;
   if (options.images.size() == 1) return outputs.writes("--error-map", options.error_map, OutputKind::kPng);
   for (const std::string& path : map_paths(options))
@@ -193,13 +233,16 @@ void compare(const CompareOptions& options) {
     if (c.results[0].n_non_finite)
       fmt::print(stderr, "covary: {}: {} of {} pixels are not finite here or in the reference and are left out\n", path,
                  c.results[0].n_non_finite, c.results[0].n_non_finite + c.results[0].n_pixels);
-    if (!(c.window == references[0].place().window))
+    if (!(c.window == references[0].place().window) || !(c.window == c.of_image))
       fmt::print(stderr, "covary: {}: compared over the pixels in common, {}\n", path, text_of(c.window));
   }
 
-  const std::vector<std::vector<std::string>> warnings = warn_of_comparison(
+  std::vector<std::vector<std::string>> warnings = warn_of_comparison(
       options.images,
       options.reference2.empty() ? std::vector{options.reference} : std::vector{options.reference, options.reference2});
+  for (size_t i = 0; i < comparisons.size(); ++i)
+    for (const std::string& text : noise_warnings(options, options.images[i], comparisons[i]))
+      fmt::print(stderr, "warning: {}\n", text), warnings[i].push_back(text);
   const bool json_to_output = options.json && (options.json->empty() || *options.json == "-");
   std::string json;
   if (options.json)
@@ -221,6 +264,9 @@ void add_compare(CLI::App& app) {
   add_value(*command, "-r,--reference", o->reference, kFileValue, "The reference image, or ref_####.exr")->required();
   add_value(*command, "--reference2", o->reference2, kFileValue,
             "A second, independent reference: products (F - R1)(F - R2) cancel the references' noise");
+  add_value(*command, "--denominator", o->denominator, kFileValue,
+            "With two references: an image with little noise that relmse and relmse-trimmed are relative to; default: "
+            "the denoised references");
   add_value(*command, "-m,--metric", o->metrics, "METRIC",
             "relmse, relmse-trimmed, mse, mae, mape, flip, above5; several separated by commas")
       ->delimiter(',')

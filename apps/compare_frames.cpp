@@ -9,6 +9,7 @@
 
 #include "comparison_warnings.h"
 #include "core/error.h"
+#include "denoising/denoised_references.h"
 #include "film/image_file.h"
 #include "film/outputs.h"
 #include "frame_files.h"
@@ -43,13 +44,24 @@ std::vector<std::string> references_of(const CompareOptions& o, int frame) {
   return paths;
 }
 
+/// --denominator, or the denoised references.
+std::vector<Image> denominators_of(const CompareOptions& o, int frame, const std::string& path, const ImagePlace& place,
+                                   const CropWindow& window, const std::vector<Image>& references) {
+  if (o.denominator.empty()) return denoised_references(references);
+  const std::string file = file_of_frame(o.denominator, frame);
+  PlacedImage image = read_image(file, o.layer);
+  if (!(common_window(path, place, window, file, image.place) == window))
+    throw Error(ErrorCode::kInput, fmt::format("--denominator '{}' does not cover {}", file, text_of(window)));
+  return {cut(std::move(image), window)};
+}
+
 ComparedSequence compare_sequence(const CompareOptions& o, const std::string& pattern, const std::vector<int>& frames) {
   ComparedSequence sequence{pattern, {}, {}};
   for (const int frame : frames) {
     const std::string path = frame_name(pattern, frame);
     const std::vector<std::string> reference_paths = references_of(o, frame);
     const ImagePlace place = inspect_image(path).place;
-    constexpr double kImages = 8 * 3 * sizeof(float),
+    constexpr double kImages = 12 * 3 * sizeof(float),
                      kFlip = 2 * 120;  // two frames and their references; metrics/flip.cpp
     require_image_memory(path, place.window.width, place.window.height, kImages + kFlip);
     PlacedImage image = read_image(path, o.layer);
@@ -63,10 +75,13 @@ ComparedSequence compare_sequence(const CompareOptions& o, const std::string& pa
     std::vector<Image> references;
     for (PlacedImage& source : sources) references.push_back(cut(std::move(source), window));
     Image pixels = cut(std::move(image), window);
+    std::vector<Image> denominators;
+    if (references.size() == 2) denominators = denominators_of(o, frame, path, place, window, references);
     sequence.metrics.emplace_back();
     for (const std::string& name : o.metrics)
-      sequence.metrics.back().push_back(compute_metric(find_metric(name).metric, pixels, references, low).value);
-    sequence.errors.add(std::move(pixels), std::move(references), low);
+      sequence.metrics.back().push_back(
+          compute_metric(find_metric(name).metric, pixels, references, low, denominators).value);
+    sequence.errors.add(std::move(pixels), std::move(references), low, std::move(denominators));
     if (const uint64_t n = sequence.errors.frames().back().n_non_finite)
       fmt::print(stderr, "covary: {}: {} pixels are not finite here or in the reference and are left out\n", path, n);
   }
@@ -130,7 +145,7 @@ void print_errors(const CompareOptions& o, const std::vector<ComparedSequence>& 
                   const std::vector<int>& frames, size_t width) {
   for (const std::string& name : o.metrics) {
     const MetricInfo& info = find_metric(name);
-    fmt::print("{} = {}\n", name, o.reference2.empty() ? info.formula : info.formula_two);
+    fmt::print("{} = {}\n", name, formula_text(o, info));
   }
   fmt::print(
       "temporal = relmse of changes since the frame before\n"
@@ -175,6 +190,24 @@ std::vector<std::string> warnings_of(const CompareOptions& o, const std::string&
 
 }  // namespace
 
+bool has_relative_metric(const CompareOptions& o) {
+  return std::any_of(o.metrics.begin(), o.metrics.end(), [](const std::string& name) {
+    const Metric metric = find_metric(name).metric;
+    return metric == Metric::kRelMse || metric == Metric::kRelMseTrimmed;
+  });
+}
+
+std::string formula_text(const CompareOptions& o, const MetricInfo& metric) {
+  if (o.reference2.empty()) return metric.formula;
+  std::string text = metric.formula_two;
+  const std::string denoised = "denoised references";
+  if (const size_t at = text.find("the " + denoised); !o.denominator.empty() && at != std::string::npos)
+    text.replace(at, 4 + denoised.size(), o.denominator);
+  else if (const size_t short_at = text.find(denoised); !o.denominator.empty() && short_at != std::string::npos)
+    text.replace(short_at, denoised.size(), o.denominator);
+  return text;
+}
+
 bool compares_frames(const CompareOptions& o) {
   const auto usage = [](const std::string& text) { throw Error(ErrorCode::kUsage, text); };
   const bool of_frames = is_frame_pattern_of_input(o.images[0]);
@@ -197,6 +230,7 @@ void compare_frames(const CompareOptions& o) {
     for (const std::string& pattern : o.images) outputs.reads(frame_name(pattern, frame));
     if (!o.baseline.empty()) outputs.reads(frame_name(o.baseline, frame));
     for (const std::string& path : references_of(o, frame)) outputs.reads(path);
+    if (!o.denominator.empty()) outputs.reads(file_of_frame(o.denominator, frame));
   }
   std::vector<ComparedSequence> sequences;
   for (const std::string& pattern : o.images) sequences.push_back(compare_sequence(o, pattern, frames));

@@ -6,16 +6,23 @@
 #include <string>
 #include <vector>
 
+#include "metrics/metrics.h"
+
 namespace covary {
 
 /// Options of `covary compare`.
 struct CompareOptions {
   std::vector<std::string> images;
-  std::string reference, reference2, layer, error_map, frames, baseline;
+  std::string reference, reference2, denominator, layer, error_map, frames, baseline;
   std::vector<std::string> metrics{"relmse"};
   std::vector<double> error_range;
   std::optional<std::string> json;  // "" and "-": standard output
 };
+
+/// Whether any metric is relative to --denominator or the denoised references, given two.
+bool has_relative_metric(const CompareOptions& options);
+/// What is printed of a metric.
+std::string formula_text(const CompareOptions& options, const MetricInfo& metric);
 
 /// Whether the images are patterns with '#'. Throws Error(kUsage) if only some are, or if options do not fit.
 bool compares_frames(const CompareOptions& options);

@@ -23,13 +23,16 @@ class MetricResult:
     n_non_finite: int
     #: The error of each pixel, [H, W].
     map: FloatArray = field(repr=False)
+    #: Standard error of relmse and mse by the noise of two references; otherwise 0.
+    reference_error: float = 0.0
 
 
-@checked(name=text, image=array, reference=array, reference2=array, low_dynamic_range=flag)
+@checked(name=text, image=array, reference=array, reference2=array, denominator=array, low_dynamic_range=flag)
 def compute(name: str, image: Any, reference: Any, reference2: Any = None, *,
-            low_dynamic_range: bool = False) -> MetricResult:
+            denominator: Any = None, low_dynamic_range: bool = False) -> MetricResult:
     """The error `name` ("relmse", "flip", …) of an image [H, W, 3] against one reference, or two independent ones.
 
-    low_dynamic_range: clamp to [0, 1] for FLIP.
+    denominator: with two references, an image [H, W, 3] with little noise that "relmse" and "relmse-trimmed" are
+    relative to; default: the denoised references. low_dynamic_range: clamp to [0, 1] for FLIP.
     """
-    return MetricResult(*_covary.metric(name, image, reference, reference2, low_dynamic_range))
+    return MetricResult(*_covary.metric(name, image, reference, reference2, denominator, low_dynamic_range))

@@ -8,6 +8,7 @@
 #include "combine/grouped_file.h"
 #include "core/error.h"
 #include "denoising/denoise.h"
+#include "denoising/denoised_references.h"
 #include "film/image_file.h"
 #include "film/image_writer.h"
 #include "metrics/metrics.h"
@@ -50,15 +51,26 @@ nb::object read_groups(const std::vector<std::string>& paths, const std::string&
 }
 
 nb::tuple metric(const std::string& name, nb::object image, nb::object reference, nb::object reference2,
-                 bool low_dynamic_range) {
+                 nb::object denominator, bool low_dynamic_range) {
   const Metric metric = find_metric(name).metric;
   const Image pixels = image_of(image, "image");
   std::vector<Image> references{image_of(reference, "reference")};
   if (!reference2.is_none()) references.push_back(image_of(reference2, "reference2"));
+  const bool is_relative = metric == Metric::kRelMse || metric == Metric::kRelMseTrimmed;
+  std::vector<Image> denominators;
+  if (!denominator.is_none()) {
+    if (references.size() < 2 || !is_relative)
+      throw Error(ErrorCode::kUsage, "denominator: it takes effect only in relmse and relmse-trimmed with reference2");
+    denominators.push_back(image_of(denominator, "denominator"));
+  }
   MetricResult result;
-  const auto compute = [&] { result = compute_metric(metric, pixels, references, low_dynamic_range); };
+  const auto compute = [&] {
+    if (denominators.empty() && is_relative) denominators = denoised_references(references);
+    result = compute_metric(metric, pixels, references, low_dynamic_range, denominators);
+  };
   run_work([&](WorkState& state) { run_stoppable(state, compute); }, nb::none());
-  return nb::make_tuple(result.value, result.n_pixels, result.n_non_finite, array_of(std::move(result.map)));
+  return nb::make_tuple(result.value, result.n_pixels, result.n_non_finite, array_of(std::move(result.map)),
+                        result.reference_error);
 }
 
 nb::object denoised(nb::object image, nb::object albedo, nb::object normal, const std::string& library) {
@@ -89,9 +101,10 @@ void bind_images(nb::module_& module) {
   module.def("read_groups", &read_groups, "paths"_a, "layer"_a,
              nb::sig("def read_groups(paths: list[str], layer: str) -> typing.Any"));
   module.def("metric", &metric, "name"_a, "image"_a.none(), "reference"_a.none(), "reference2"_a.none(),
-             "low_dynamic_range"_a,
+             "denominator"_a.none(), "low_dynamic_range"_a,
              nb::sig("def metric(name: str, image: object, reference: object, reference2: object | None, "
-                     "low_dynamic_range: bool) -> tuple[float, int, int, typing.Any]"));
+                     "denominator: object | None, low_dynamic_range: bool) -> tuple[float, int, int, typing.Any, "
+                     "float]"));
   module.def("denoise", &denoised, "image"_a.none(), "albedo"_a.none(), "normal"_a.none(), "library"_a,
              nb::sig("def denoise(image: object, albedo: object | None, normal: object | None, library: str) -> "
                      "typing.Any"));

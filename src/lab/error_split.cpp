@@ -15,9 +15,11 @@ namespace {
 /// The references, per pixel and in double: what does not change from render to render.
 class References {
  public:
-  explicit References(std::span<const Image> images) : first_(images.front()), second_(images.back()) {
+  References(std::span<const Image> images, std::span<const Image> denominators)
+      : images_(images), denominators_(denominators), first_(images.front()), second_(images.back()) {
     COVARY_CHECK(images.size() == 1 || images.size() == 2, "one or two references");
     for (const Image& image : images) check_size(image);
+    for (const Image& image : denominators) check_size(image);
   }
   void check_size(const Image& image) const {
     COVARY_CHECK(image.channels == 3, "3 channels");
@@ -29,9 +31,11 @@ class References {
   bool finite(size_t p) const { return pixel_is_finite(first_, p) && pixel_is_finite(second_, p); }
   double mean(size_t i) const { return 0.5 * (static_cast<double>(first_.data[i]) + second_.data[i]); }
   double half_difference(size_t i) const { return 0.5 * (static_cast<double>(first_.data[i]) - second_.data[i]); }
+  double weight(size_t p) const { return relative_weight(images_, denominators_, p); }
   double grey(size_t p) const { return (mean(3 * p) + mean(3 * p + 1) + mean(3 * p + 2)) / 3; }
 
  private:
+  std::span<const Image> images_, denominators_;
   const Image &first_, &second_;
 };
 
@@ -71,8 +75,7 @@ template <typename Body>
 void for_each_pixel(const MeanImage& mean, const References& references, const Body& body) {
   for (size_t p = 0; p < mean.finite.size(); ++p) {
     if (!mean.finite[p]) continue;
-    const double grey = references.grey(p);
-    body(p, grey, 1 / (grey * grey + kRelativeOffset));
+    body(p, references.grey(p), references.weight(p));
   }
 }
 
@@ -169,9 +172,10 @@ SplitError split(const std::vector<double>& error, const std::vector<double>& ar
 
 }  // namespace
 
-ErrorSplit split_error(std::span<const Image> renders, std::span<const Image> images) {
+ErrorSplit split_error(std::span<const Image> renders, std::span<const Image> images,
+                       std::span<const Image> denominators) {
   COVARY_CHECK(!renders.empty(), "at least one render");
-  const References references(images);
+  const References references(images, denominators);
   const MeanImage mean = mean_image(renders, references);
   const ReferenceSums own = reference_sums(mean, references);
   ErrorSplit result;
@@ -198,6 +202,7 @@ ErrorSplit split_error(std::span<const Image> renders, std::span<const Image> im
   result.absolute = split(error[kAbsolute], around_mean[kAbsolute], reference_error(kAbsolute));
   result.mean_ratio = widened(mean_estimate(result.mean_ratio_of_render), std::sqrt(own.grey_squares) / own.grey);
   result.reference_error = own.own_error / (3 * n);
+  result.reference_noise = reference_error(kRelative);
   result.reference_lean = own.lean.z();
   return result;
 }

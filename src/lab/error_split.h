@@ -3,7 +3,7 @@
 // and references that do not belong together.
 //
 // K renders F_s with different seeds, references R1, R2 with independent samples, R = (R1 + R2)/2. Means <x> are over
-// pixels and channels, weighted by 1/(R'^2 + 0.01) for relMSE (R': mean of a pixel's channels) and by 1 for MSE.
+// pixels and channels, weighted by relative_weight() (metrics/metrics.h) for relMSE and by 1 for MSE.
 //     error         mean over s of <(F_s - R1)(F_s - R2)>
 //     variance      sum over s of <(F_s - F)^2> / (K - 1), F: mean of the renders
 //     squared bias  mean over pairs s != t of <(F_s - R1)(F_t - R2)> = error - variance
@@ -36,6 +36,7 @@ struct ErrorSplit {
   std::vector<double> mean_ratio_of_render;
   /// relMSE of R itself: <(R1 - R2)^2 / 4>; far smaller errors cannot be resolved.
   double reference_error = 0;
+  double reference_noise = 0;  ///< standard error of the relMSE by the noise of two references
   /// Standard normal if the renders share no more samples with one reference than with the other, and both references
   /// are equally good: sum of (F - R)(R1 - R2) over the root of its sum of squares.
   double reference_lean = 0;
@@ -44,8 +45,10 @@ struct ErrorSplit {
 };
 
 /// Needs at least one render, and one or two references of the same size, linear RGB. With one reference, its noise
-/// counts as squared bias, and leaning cannot be tested. Throws Error(kInput) if sizes differ or no pixel is left.
-ErrorSplit split_error(std::span<const Image> renders, std::span<const Image> references);
+/// counts as squared bias, and leaning cannot be tested. `denominators`: see compute_metric(). Throws Error(kInput) if
+/// sizes differ or no pixel is left.
+ErrorSplit split_error(std::span<const Image> renders, std::span<const Image> references,
+                       std::span<const Image> denominators = {});
 
 /// Suspicious findings about a split, in sentences; empty if there are none. `unbiased`: the renders are expected to
 /// have no bias (plain path tracing), so a squared bias suggests a reference of another scene.

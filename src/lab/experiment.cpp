@@ -248,9 +248,9 @@ class Experiment {
   void measure_scene(size_t s) {
     SceneResult& scene = results_.scenes[s];
     if (scene.reference.files.empty()) return;
-    std::vector<Image> references;
+    SceneReferences references;
     try {
-      for (const std::string& file : scene.reference.files) references.push_back(read_window(file, scene.scene));
+      references = read_references(scene.reference.files, scene.scene);
       check_seeds(scene);
       if (references_[s].empty()) warn_of_given_references(s);
     } catch (const std::exception& error) {
@@ -353,19 +353,19 @@ class Experiment {
     }
   }
 
-  /// One warning per scene, for the method with the smallest error.
+  /// One warning per scene, for the method with the smallest error, if the references' noise makes that uncertain.
   void warn_of_noisy_references() {
     for (size_t s = 0; s < results_.scenes.size(); ++s) {
       const Cell* best = nullptr;
       for (const Cell& cell : results_.cells)
         if (cell.scene == s && (!best || cell.split.relative.error.value < best->split.relative.error.value))
           best = &cell;
-      if (!best || best->split.n_references < 2 || best->split.reference_error < best->split.relative.error.value)
+      if (!best || best->split.reference_noise <= kMostReferenceNoise * std::abs(best->split.relative.error.value))
         continue;
       results_.warnings.push_back(
-          fmt::format("{}: the reference's own relMSE, {:.2g}, is above that of the best method, {:.2g}: errors are "
-                      "still unbiased, but a reference with more samples would reduce their uncertainty",
-                      results_.suite.scenes[s].name, best->split.reference_error, best->split.relative.error.value));
+          fmt::format("{}: the noise of the references makes the error of the best method, {:.2g}, uncertain by "
+                      "±{:.2g}; references with more samples would tell more",
+                      results_.suite.scenes[s].name, best->split.relative.error.value, best->split.reference_noise));
     }
   }
 

@@ -40,18 +40,15 @@ Image standard_errors(const std::string& path, const SceneInstance& scene) {
   return has_errors && scene.entry.layer.empty() ? read_window(path, scene, "StdError") : Image();
 }
 
-/// relMSE predicted by the standard errors, with the references in the denominator; NaN if there are none.
-double predicted_relmse(const Image& errors, const std::vector<Image>& references) {
+/// relMSE predicted by the standard errors, with the weights of the true one; NaN if there are none.
+double predicted_relmse(const Image& errors, const SceneReferences& references) {
   if (errors.data.empty()) return kNone;
   double sum = 0;
   size_t n = 0;
   for (size_t p = 0; p < errors.data.size() / 3; ++p) {
-    double grey = 0, squares = 0;
-    for (size_t i = 3 * p; i < 3 * p + 3; ++i) {
-      grey += (static_cast<double>(references.front().data[i]) + references.back().data[i]) / 6;
-      squares += static_cast<double>(errors.data[i]) * errors.data[i] / 3;
-    }
-    const double value = squares / (grey * grey + kRelativeOffset);
+    double squares = 0;
+    for (size_t i = 3 * p; i < 3 * p + 3; ++i) squares += static_cast<double>(errors.data[i]) * errors.data[i] / 3;
+    const double value = squares * relative_weight(references.images, references.denominators, p);
     if (std::isfinite(value)) sum += value, ++n;
   }
   return sum / static_cast<double>(n);
@@ -78,7 +75,7 @@ double number_or_none(const nlohmann::json& json, const char* name) {
 }
 
 /// Measures the values in kKept.
-void measure_image(const Image& image, const SceneInstance& scene, const std::vector<Image>& references,
+void measure_image(const Image& image, const SceneInstance& scene, const SceneReferences& references,
                    const Cache& cache, const std::string& key, RunResult& run) {
   if (const std::optional<nlohmann::json> kept = cache.read_json("measures", key + ".json");
       kept && kept->contains("predicted_relmse_low")) {
@@ -91,7 +88,7 @@ void measure_image(const Image& image, const SceneInstance& scene, const std::ve
   run.relmse_trimmed = error(Metric::kRelMseTrimmed);
   run.mae = error(Metric::kMae), run.flip = error(Metric::kFlip), run.above5 = error(Metric::kAbove5);
   run.predicted_relmse = predicted_relmse(std_error, references);
-  run.coverage = coverage(image, std_error, references);
+  run.coverage = coverage(image, std_error, references.images);
   // Bounds that a single image reports for its relMSE; those of frames are per frame.
   if (const std::vector<std::string> files = files_of(scene.frames, path); files.size() == 1 && !std_error.data.empty())
     if (const auto bounds = predicted_bounds(inspect_image(files[0])))
@@ -275,7 +272,7 @@ void warn_of_left_out(Results& results, const std::vector<size_t>& common, size_
 
 }  // namespace
 
-void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& references, bool unbiased,
+void measure(Cell& cell, const SceneInstance& scene, const SceneReferences& references, bool unbiased,
              const Budget& budget, const Cache& cache, const std::vector<std::string>& run_keys,
              const std::string& reference_key) {
   const size_t n = cell.runs.size();
@@ -283,13 +280,13 @@ void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& r
   parallel_for(n, [&](size_t s) {
     RunResult& run = cell.runs[s];
     images[s] = read_window(run.record.image, scene);
-    const std::string key = key_text(run_keys[s] + " " + reference_key + scene.entry.layer);
+    const std::string key = key_text(run_keys[s] + " relative to denoised " + reference_key + scene.entry.layer);
     measure_image(images[s], scene, references, cache, key, run);
     run.frames = frame_errors(images[s], references, scene);
     const SequenceSummary of_frames = summary_of(run.frames);
     run.temporal = of_frames.temporal, run.temporal_flip = of_frames.temporal_flip;
   });
-  cell.split = split_error(images, references);
+  cell.split = split_error(images, references.images, references.denominators);
   for (size_t s = 0; s < n; ++s) {
     cell.runs[s].relmse = cell.split.relative.of_render[s];
     cell.runs[s].mse = cell.split.absolute.of_render[s];

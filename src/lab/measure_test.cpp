@@ -66,7 +66,7 @@ class Measure : public testing::Test {
     return cell;
   }
   void measure_cell(Cell& cell, const Budget& budget = {24, 0}) {
-    measure(cell, scene(), {constant(1)}, false, budget, cache_, keys_, "reference");
+    measure(cell, scene(), {{constant(1)}, {}}, false, budget, cache_, keys_, "reference");
   }
   Cache cache_{test_file("cache")};
   std::vector<std::string> keys_ = {"first run", "second run"};
@@ -143,7 +143,7 @@ TEST_F(Measure, IntervalsCountTheNoiseOfReferences) {
   const auto coverage = [&](const std::vector<Image>& references, const std::string& key) {
     Cell cell;
     cell.runs = {run_of(1, write("narrow.exr", constant(1.2f), 0.05f), 1, 0)};
-    measure(cell, scene(), references, false, {24, 0}, cache_, keys_, key);
+    measure(cell, scene(), {references, {}}, false, {24, 0}, cache_, keys_, key);
     return cell.coverage.value;
   };
   EXPECT_EQ(coverage({constant(1), constant(1)}, "exact"), 0) << "0.2 is four standard errors";
@@ -157,7 +157,7 @@ TEST_F(Measure, ReadsTheLayerThatTheSceneNames) {
   SceneInstance errors = scene();
   errors.entry.layer = "StdError";
   Cell cell = two_runs();
-  measure(cell, errors, {constant(1)}, false, {24, 0}, cache_, keys_, "reference");
+  measure(cell, errors, {{constant(1)}, {}}, false, {24, 0}, cache_, keys_, "reference");
   EXPECT_NEAR(cell.runs[0].mse, 0.49, 1e-6);
   EXPECT_TRUE(std::isnan(cell.runs[0].predicted_relmse));
   measure_cell(cell);
@@ -173,7 +173,7 @@ TEST_F(Measure, KeepsErrorsOfImages) {
   measure_cell(again);
   EXPECT_EQ(again.runs[0].mae, cell.runs[0].mae) << "from the cache";
   EXPECT_NEAR(again.runs[0].mse, 4, 1e-5) << "from the image";
-  measure(again, scene(), {constant(1)}, false, {24, 0}, cache_, keys_, "another reference");
+  measure(again, scene(), {{constant(1)}, {}}, false, {24, 0}, cache_, keys_, "another reference");
   EXPECT_NEAR(again.runs[0].mae, 2, 1e-5);
 }
 

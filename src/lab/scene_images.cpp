@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "denoising/denoised_references.h"
 #include "film/image_file.h"
 #include "metrics/alignment.h"
 
@@ -24,6 +25,25 @@ Image read_one(const std::string& path, const SceneInstance& scene, const std::s
       want.y + want.height > have.y + have.height)
     throw Error(ErrorCode::kInput, fmt::format("{} ({}) does not cover {}", path, text_of(have), text_of(want)));
   return cut(source, want);
+}
+
+/// The references of each image.
+std::vector<SceneReferences> by_frame(const SceneReferences& references, const SceneInstance& scene) {
+  std::vector<SceneReferences> frames(scene.n_images());
+  const auto split = [&](const std::vector<Image>& all, std::vector<Image> SceneReferences::*member) {
+    for (const Image& pixels : all) {
+      std::vector<Image> images = images_of(pixels, scene);
+      for (size_t f = 0; f < frames.size(); ++f) (frames[f].*member).push_back(std::move(images[f]));
+    }
+  };
+  split(references.images, &SceneReferences::images), split(references.denominators, &SceneReferences::denominators);
+  return frames;
+}
+
+/// Adds rows below.
+void append(const Image& rows, Image& image) {
+  image.width = rows.width, image.height += rows.height, image.channels = 3;
+  image.data.insert(image.data.end(), rows.data.begin(), rows.data.end());
 }
 
 }  // namespace
@@ -49,33 +69,34 @@ std::vector<Image> images_of(const Image& pixels, const SceneInstance& scene) {
   return images;
 }
 
-double mean_metric(Metric metric, const Image& image, const std::vector<Image>& references,
-                   const SceneInstance& scene) {
-  if (scene.frames.empty()) return compute_metric(metric, image, references).value;
-  const std::vector<Image> images = images_of(image, scene);
-  std::vector<std::vector<Image>> of_references;
-  for (const Image& reference : references) of_references.push_back(images_of(reference, scene));
-  double sum = 0;
-  for (size_t f = 0; f < images.size(); ++f) {
-    std::vector<Image> of_frame;
-    for (const std::vector<Image>& frames : of_references) of_frame.push_back(frames[f]);
-    sum += compute_metric(metric, images[f], of_frame).value;
+SceneReferences read_references(const std::vector<std::string>& files, const SceneInstance& scene) {
+  SceneReferences references;
+  for (const std::string& file : files) references.images.push_back(read_window(file, scene));
+  for (const SceneReferences& of_frame : by_frame(references, scene)) {
+    const std::vector<Image> denoised = denoised_references(of_frame.images);
+    references.denominators.resize(denoised.size());
+    for (size_t i = 0; i < denoised.size(); ++i) append(denoised[i], references.denominators[i]);
   }
+  return references;
+}
+
+double mean_metric(Metric metric, const Image& image, const SceneReferences& references, const SceneInstance& scene) {
+  const std::vector<Image> images = images_of(image, scene);
+  const std::vector<SceneReferences> all = by_frame(references, scene);
+  double sum = 0;
+  for (size_t f = 0; f < images.size(); ++f)
+    sum += compute_metric(metric, images[f], all[f].images, false, all[f].denominators).value;
   return sum / static_cast<double>(images.size());
 }
 
-std::vector<FrameErrors> frame_errors(const Image& image, const std::vector<Image>& references,
+std::vector<FrameErrors> frame_errors(const Image& image, const SceneReferences& references,
                                       const SceneInstance& scene) {
   if (scene.frames.empty()) return {};
   std::vector<Image> frames = images_of(image, scene);
-  std::vector<std::vector<Image>> of_references;
-  for (const Image& reference : references) of_references.push_back(images_of(reference, scene));
+  std::vector<SceneReferences> all = by_frame(references, scene);
   SequenceErrors errors;
-  for (size_t f = 0; f < frames.size(); ++f) {
-    std::vector<Image> of_frame;
-    for (std::vector<Image>& all : of_references) of_frame.push_back(std::move(all[f]));
-    errors.add(std::move(frames[f]), std::move(of_frame));
-  }
+  for (size_t f = 0; f < frames.size(); ++f)
+    errors.add(std::move(frames[f]), std::move(all[f].images), false, std::move(all[f].denominators));
   return errors.frames();
 }
 

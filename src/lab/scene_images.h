@@ -19,12 +19,19 @@ Image read_window(const std::string& path, const SceneInstance& scene, const std
 /// Splits such pixels into the images they consist of.
 std::vector<Image> images_of(const Image& pixels, const SceneInstance& scene);
 
+/// One or two references of a scene, and what relative errors are relative to (compute_metric()): of two references,
+/// these denoised.
+struct SceneReferences {
+  std::vector<Image> images, denominators;
+};
+/// Throws like read_window().
+SceneReferences read_references(const std::vector<std::string>& files, const SceneInstance& scene);
+
 /// The mean of a metric over the scene's images.
-double mean_metric(Metric metric, const Image& pixels, const std::vector<Image>& references,
-                   const SceneInstance& scene);
+double mean_metric(Metric metric, const Image& pixels, const SceneReferences& references, const SceneInstance& scene);
 
 /// Errors of frames; empty for a single image.
-std::vector<FrameErrors> frame_errors(const Image& pixels, const std::vector<Image>& references,
+std::vector<FrameErrors> frame_errors(const Image& pixels, const SceneReferences& references,
                                       const SceneInstance& scene);
 
 }  // namespace covary::lab

@@ -15,6 +15,22 @@ constexpr int kBandPixels = 1 << 20;  // 12 MB per image
 
 }  // namespace
 
+ComparedRows::Band ComparedRows::rows(int first_row, int n_rows) {
+  Band band = read(first_row, n_rows);
+  for (const Image& image : denominators_) band.denominators.push_back(image.pixel(0, first_row));
+  return band;
+}
+
+void ComparedRows::set_denominators(std::span<const Image> denominators) {
+  for (const Image& image : denominators) {
+    COVARY_CHECK(image.channels == 3, "3 channels");
+    if (image.width != width_ || image.height != height_)
+      throw Error(ErrorCode::kInput, fmt::format("{} x {} pixels are compared; the denominator has {} x {}", width_,
+                                                 height_, image.width, image.height));
+  }
+  denominators_ = denominators;
+}
+
 WholeImages::WholeImages(const Image& image, std::span<const Image> references) {
   COVARY_CHECK(references.size() == 1 || references.size() == 2, "one or two references");
   for (const Image& r : references) {
@@ -28,7 +44,7 @@ WholeImages::WholeImages(const Image& image, std::span<const Image> references) 
   width_ = image.width, height_ = band_rows_ = image.height;
 }
 
-ComparedRows::Band WholeImages::rows(int first_row, int n_rows) {
+ComparedRows::Band WholeImages::read(int first_row, int n_rows) {
   COVARY_CHECK(first_row == 0 && n_rows == height_, "all rows");
   return whole_;
 }
@@ -58,7 +74,7 @@ void ComparedFiles::move_to(int first_row, int n_rows, Source& source) const {
   source.rows = std::move(rows), source.first = first_row;
 }
 
-ComparedRows::Band ComparedFiles::rows(int first_row, int n_rows) {
+ComparedRows::Band ComparedFiles::read(int first_row, int n_rows) {
   for (Source& source : sources_) move_to(first_row, n_rows, source);
   Band band;
   band.image = &sources_[0].rows;

@@ -22,12 +22,21 @@ class ComparedRows {
   struct Band {
     const Image* image = nullptr;
     std::vector<const Image*> references;
+    std::vector<const float*> denominators;  ///< first values of these rows; empty: none
   };
   /// Rows [first_row, first_row + n_rows); valid until the next call. Bands may overlap.
-  virtual Band rows(int first_row, int n_rows) = 0;
+  Band rows(int first_row, int n_rows);
+  /// What relative errors are relative to (compute_metric()): images of the same size, which must outlive the rows.
+  /// Throws Error(kInput) if their sizes differ.
+  void set_denominators(std::span<const Image> denominators);
 
  protected:
+  /// Image and references of rows().
+  virtual Band read(int first_row, int n_rows) = 0;
   int width_ = 0, height_ = 0, band_rows_ = 0;
+
+ private:
+  std::span<const Image> denominators_;
 };
 
 /// Images in memory, as one band. Throws Error(kInput) if their sizes differ.
@@ -35,9 +44,9 @@ class WholeImages final : public ComparedRows {
  public:
   /// Stores pointers; the images must outlive it. `references`: one or two.
   WholeImages(const Image& image, std::span<const Image> references);
-  Band rows(int first_row, int n_rows) override;
 
  private:
+  Band read(int first_row, int n_rows) override;
   Band whole_;
 };
 
@@ -46,9 +55,9 @@ class ComparedFiles final : public ComparedRows {
  public:
   /// `images`: F and its references, each covering `window`.
   ComparedFiles(std::span<ImageRows* const> images, const CropWindow& window);
-  Band rows(int first_row, int n_rows) override;
 
  private:
+  Band read(int first_row, int n_rows) override;
   struct Source {
     ImageRows* file;
     Image rows;     ///< the current band

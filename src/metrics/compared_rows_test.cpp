@@ -25,18 +25,19 @@ class Bands final : public ComparedRows {
     for (const Image& r : references) sources_.push_back(&r);
     width_ = image.width, height_ = image.height, band_rows_ = band_rows;
   }
-  Band rows(int first_row, int n_rows) override {
+
+ private:
+  Band read(int first_row, int n_rows) override {
     kept_.clear();
     for (const Image* source : sources_) {
       Image& rows = kept_.emplace_back(width_, n_rows, 3);
       std::copy_n(source->pixel(0, first_row), rows.data.size(), rows.data.begin());
     }
-    Band band{&kept_[0], {}};
+    Band band{&kept_[0], {}, {}};
     for (size_t i = 1; i < kept_.size(); ++i) band.references.push_back(&kept_[i]);
     return band;
   }
 
- private:
   std::vector<const Image*> sources_;
   std::vector<Image> kept_;
 };
@@ -71,10 +72,12 @@ TEST(ComparedRows, BandsOfAnyHeightGiveTheSameBits) {
     for (const size_t n_references : {1, 2})
       for (const bool low_dynamic_range : {false, true}) {
         const std::vector<Image> given(references.begin(), references.begin() + static_cast<ptrdiff_t>(n_references));
-        const MetricResult whole = compute_metric(info.metric, image, given, low_dynamic_range);
+        const std::vector<Image> denominators(n_references == 2 ? 2 : 0, picture(61, 67, 4));
+        const MetricResult whole = compute_metric(info.metric, image, given, low_dynamic_range, denominators);
         EXPECT_GT(whole.n_non_finite, 0u);
         for (const int band_rows : {1, 9, 23, 66}) {
           Bands bands(image, given, band_rows);
+          bands.set_denominators(denominators);
           expect_equal(compute_metric(info.metric, bands, low_dynamic_range, true), whole,
                        info.name + " in bands of " + std::to_string(band_rows));
         }

@@ -17,18 +17,38 @@
 namespace covary {
 namespace {
 
+double weight_of(double denominator) { return 1 / (denominator * denominator + kRelativeOffset); }
+
 /// A pixel of the image and its references, in double.
 struct Pixel {
-  std::array<double, 3> f, r1, r2, r;  // r: mean of the references
-  double grey = 0;                     // mean of r over the channels
+  std::array<double, 3> f, r1, r2, r;          // r: mean of the references
+  double weight = 0;                           // of squared errors in relMSE
+  std::array<double, 3> channel_weights = {};  // likewise, by each channel's own value
   Pixel(const ComparedRows::Band& band, size_t p) {
     for (size_t c = 0; c < 3; ++c) {
       f[c] = band.image->data[p * 3 + c];
       r1[c] = band.references.front()->data[p * 3 + c];
       r2[c] = band.references.back()->data[p * 3 + c];
       r[c] = 0.5 * (r1[c] + r2[c]);
-      grey += r[c] / 3;
     }
+    for (const float* values : band.denominators) add_denominator(values + 3 * p, band.denominators.size());
+    if (band.denominators.empty()) add_denominator(r.data(), 1);
+  }
+  template <typename Value>
+  void add_denominator(const Value* d, size_t n) {
+    double grey = 0;
+    for (size_t c = 0; c < 3; ++c) {
+      grey += double{d[c]} / 3;
+      channel_weights[c] += weight_of(d[c]) / static_cast<double>(n);
+    }
+    weight += weight_of(grey) / static_cast<double>(n);
+  }
+  /// What the noise of two references adds to squared_error(): the mean over channels of (F - R)(R1 - R2). Its square
+  /// has the variance of squared_error() as its expectation.
+  double noise() const {
+    double sum = 0;
+    for (size_t c = 0; c < 3; ++c) sum += (f[c] - r[c]) * (r1[c] - r2[c]);
+    return sum / 3;
   }
   /// Mean over channels of (F - R1)(F - R2); of the squared difference if there is one reference.
   double squared_error() const {
@@ -42,7 +62,7 @@ double pixel_error(Metric metric, const Pixel& p) {
   double sum = 0;
   switch (metric) {
     case Metric::kRelMse:
-      return p.squared_error() / (p.grey * p.grey + kRelativeOffset);
+      return p.squared_error() * p.weight;
     case Metric::kMse:
       return p.squared_error();
     case Metric::kMae:
@@ -71,6 +91,8 @@ float map_value(double error) {
 
 /// Whether all values of a pixel are finite.
 bool is_finite(const ComparedRows::Band& band, size_t p) {
+  for (const float* d : band.denominators)
+    if (!std::isfinite(d[3 * p] + d[3 * p + 1] + d[3 * p + 2])) return false;
   return pixel_is_finite(*band.image, p) && pixel_is_finite(*band.references.front(), p) &&
          pixel_is_finite(*band.references.back(), p);
 }
@@ -81,7 +103,7 @@ std::array<double, 3> channel_errors(const ComparedRows::Band& band, size_t p) {
   if (!is_finite(band, p)) return errors;
   const Pixel pixel(band, p);
   for (size_t c = 0; c < 3; ++c)
-    errors[c] = (pixel.f[c] - pixel.r1[c]) * (pixel.f[c] - pixel.r2[c]) / (pixel.r[c] * pixel.r[c] + kRelativeOffset);
+    errors[c] = (pixel.f[c] - pixel.r1[c]) * (pixel.f[c] - pixel.r2[c]) * pixel.channel_weights[c];
   return errors;
 }
 
@@ -170,6 +192,14 @@ class ErrorOfPixels {
   /// Index in the band of pixel p of the requested rows.
   size_t in_band(size_t p) const { return offset_ + p; }
 
+  /// Part of the square of MetricResult::reference_error, for a finite pixel of the band.
+  double squared_noise(size_t p) const {
+    if (metric_ != Metric::kRelMse && metric_ != Metric::kMse) return 0;
+    const Pixel pixel(band_, p);
+    const double noise = pixel.noise() * (metric_ == Metric::kRelMse ? pixel.weight : 1);
+    return noise * noise;
+  }
+
   /// For a finite pixel of the band.
   double error(size_t p) const {
     if (metric_ == Metric::kFlip) return flip_.data[p];
@@ -195,6 +225,18 @@ class ErrorOfPixels {
 
 }  // namespace
 
+double relative_weight(std::span<const Image> references, std::span<const Image> denominators, size_t p) {
+  double grey = 0, sum = 0;
+  for (size_t i = 3 * p; i < 3 * p + 3; ++i)
+    grey += (static_cast<double>(references.front().data[i]) + references.back().data[i]) / 6;
+  if (denominators.empty()) return weight_of(grey);
+  for (const Image& image : denominators) {
+    const float* d = &image.data[3 * p];
+    sum += weight_of((static_cast<double>(d[0]) + d[1] + d[2]) / 3);
+  }
+  return sum / static_cast<double>(denominators.size());
+}
+
 bool pixel_is_finite(const Image& image, size_t p) {
   const float* v = image.data.data() + p * 3;
   return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
@@ -203,10 +245,11 @@ bool pixel_is_finite(const Image& image, size_t p) {
 const std::vector<MetricInfo>& metrics() {
   static const std::vector<MetricInfo> all{
       {Metric::kRelMse, "relmse", "1/(3N) sum ||F - R||^2 / (R'^2 + 0.01), R' = mean of R's RGB",
-       "1/(3N) sum (F - R1).(F - R2) / (R'^2 + 0.01), R' = mean of (R1 + R2)/2's RGB"},
+       "1/(3N) sum (F - R1).(F - R2) / (D'^2 + 0.01), D' = mean of RGB of the denoised references"},
       {Metric::kRelMseTrimmed, "relmse-trimmed",
        "mean over pixels and channels of (F - R)^2 / (R^2 + 0.01), without the largest 0.1 %",
-       "mean over pixels and channels of (F - R1)(F - R2) / (R^2 + 0.01), R = (R1 + R2)/2, without the largest 0.1 %"},
+       "mean over pixels and channels of (F - R1)(F - R2) / (D^2 + 0.01), D = denoised references, without the largest "
+       "0.1 %"},
       {Metric::kMse, "mse", "1/(3N) sum ||F - R||^2", "1/(3N) sum (F - R1).(F - R2)"},
       {Metric::kMae, "mae", "1/(3N) sum |F - R|", "1/(3N) sum |F - (R1 + R2)/2|"},
       {Metric::kMape, "mape", "1/(3N) sum |F - R| / (|R| + 0.01)",
@@ -233,7 +276,7 @@ MetricResult compute_metric(Metric metric, ComparedRows& rows, bool low_dynamic_
   MetricResult result;
   if (with_map) result.map = Image(rows.width(), rows.height(), 1);
   ErrorOfPixels errors(metric, rows, low_dynamic_range);
-  double sum = 0, image_sum = 0;
+  double sum = 0, image_sum = 0, squared_noise = 0;
   size_t n_references = 1;
   std::array<double, 2> reference_sums{};
   float* map = result.map.data.data();
@@ -249,6 +292,7 @@ MetricResult compute_metric(Metric metric, ComparedRows& rows, bool low_dynamic_
       if (with_map) *map++ = finite ? map_value(error) : std::numeric_limits<float>::quiet_NaN();
       if (!finite) continue;
       sum += error;
+      squared_noise += errors.squared_noise(p);
       for (size_t k = 3 * p; k < 3 * p + 3; ++k) {
         image_sum += band.image->data[k];
         for (size_t r = 0; r < band.references.size(); ++r) reference_sums[r] += band.references[r]->data[k];
@@ -261,6 +305,7 @@ MetricResult compute_metric(Metric metric, ComparedRows& rows, bool low_dynamic_
                 fmt::format("none of the {} pixels is finite in the image and the reference", result.n_non_finite));
   const auto n = static_cast<double>(result.n_pixels);
   result.value = sum / n;
+  result.reference_error = std::sqrt(squared_noise) / n;
   result.mean = image_sum / (3 * n);
   for (size_t r = 0; r < n_references; ++r)
     result.reference_mean += reference_sums[r] / (3 * n) / static_cast<double>(n_references);
@@ -268,8 +313,9 @@ MetricResult compute_metric(Metric metric, ComparedRows& rows, bool low_dynamic_
 }
 
 MetricResult compute_metric(Metric metric, const Image& image, std::span<const Image> references,
-                            bool low_dynamic_range) {
+                            bool low_dynamic_range, std::span<const Image> denominators) {
   WholeImages rows(image, references);
+  rows.set_denominators(denominators);
   return compute_metric(metric, rows, low_dynamic_range, true);
 }
 

@@ -28,13 +28,6 @@ struct PixelError {
   double error = 0, noise = 0;
 };
 
-double weight(const std::vector<Image>& references, size_t p) {
-  double grey = 0;
-  for (size_t i = 3 * p; i < 3 * p + 3; ++i)
-    grey += (static_cast<double>(references.front().data[i]) + references.back().data[i]) / 6;
-  return 1 / (grey * grey + kRelativeOffset);
-}
-
 /// Per channel, with a = F - R1 and b = F - R2, F - R = (a + b) / 2 and R1 - R2 = b - a, so that
 /// ab = (F - R)^2 - (R1 - R2)^2 / 4. Its noise comes from the cross term (F - R)(R1 - R2), whose square estimates its
 /// variance, and from the last term.
@@ -148,7 +141,8 @@ WorstRegion found(WorstRegion worst) {
 
 }  // namespace
 
-void SequenceErrors::add(Image frame, std::vector<Image> references, bool low_dynamic_range) {
+void SequenceErrors::add(Image frame, std::vector<Image> references, bool low_dynamic_range,
+                         std::vector<Image> denominators) {
   COVARY_CHECK(references.size() == 1 || references.size() == 2, "one or two references");
   for (const Image* image : {&references.front(), &references.back(), frames_.empty() ? &frame : &before_})
     if (image->width != frame.width || image->height != frame.height)
@@ -157,13 +151,17 @@ void SequenceErrors::add(Image frame, std::vector<Image> references, bool low_dy
                               "{}",
                               frame.width, frame.height, image->width, image->height));
   FrameErrors errors;
-  std::vector<PixelError> of_pixels(frame.data.size() / 3);
+  for (const Image& image : denominators)
+    COVARY_CHECK(image.width == frame.width && image.height == frame.height, "denominators have the frame's size");
+  Weights weights(frame.data.size() / 3);
+  std::vector<PixelError> of_pixels(weights.size());
   for (size_t p = 0; p < of_pixels.size(); ++p) {
-    if (!is_finite(frame, references, p)) {
+    weights[p] = relative_weight(references, denominators, p);
+    if (!is_finite(frame, references, p) || !std::isfinite(weights[p])) {
       ++errors.n_non_finite;
       continue;
     }
-    of_pixels[p] = pixel_error(weight(references, p), [&](int c) {
+    of_pixels[p] = pixel_error(weights[p], [&](int c) {
       const double f = frame.data[3 * p + c];
       return std::pair(f - references.front().data[3 * p + c], f - references.back().data[3 * p + c]);
     });
@@ -172,25 +170,26 @@ void SequenceErrors::add(Image frame, std::vector<Image> references, bool low_dy
   errors.regions = regions_of(of_pixels, frame.width, frame.height);
   errors.temporal = errors.temporal_flip = errors.still_relmse = kNan;
   if (!frames_.empty()) {
-    add_changes(frame, references, low_dynamic_range, errors);
-    add_still(frame, references, errors);
+    add_changes(frame, references, weights, low_dynamic_range, errors);
+    add_still(frame, references, weights, errors);
   }
   frames_.push_back(std::move(errors));
-  before_ = std::move(frame), references_before_ = std::move(references);
+  before_ = std::move(frame), references_before_ = std::move(references), weights_before_ = std::move(weights);
 }
 
-void SequenceErrors::add_changes(const Image& frame, const std::vector<Image>& references, bool low_dynamic_range,
-                                 FrameErrors& errors) const {
+void SequenceErrors::add_changes(const Image& frame, const std::vector<Image>& references, const Weights& weights,
+                                 bool low_dynamic_range, FrameErrors& errors) const {
   Image f = frame, f_before = before_, r = mean_of(references), r_before = mean_of(references_before_);
   std::vector<PixelError> of_pixels(frame.data.size() / 3);
   uint64_t left_out = 0;
   for (size_t p = 0; p < of_pixels.size(); ++p) {
-    if (!is_finite(frame, references, p) || !is_finite(before_, references_before_, p)) {
+    if (!is_finite(frame, references, p) || !is_finite(before_, references_before_, p) ||
+        !std::isfinite(weights[p] + weights_before_[p])) {
       ++left_out;
       for (Image* image : {&f, &f_before, &r, &r_before}) std::fill_n(image->data.begin() + 3 * p, 3, 0.0f);
       continue;
     }
-    const double w = std::min(weight(references, p), weight(references_before_, p));
+    const double w = std::min(weights[p], weights_before_[p]);
     of_pixels[p] = pixel_error(w, [&](int c) {
       const size_t i = 3 * p + c;
       const double change = static_cast<double>(frame.data[i]) - before_.data[i];
@@ -212,7 +211,8 @@ void SequenceErrors::add_changes(const Image& frame, const std::vector<Image>& r
   errors.temporal_flip = sum / static_cast<double>(of_frame.data.size() - left_out);
 }
 
-void SequenceErrors::add_still(const Image& frame, const std::vector<Image>& references, FrameErrors& errors) const {
+void SequenceErrors::add_still(const Image& frame, const std::vector<Image>& references, const Weights& weights,
+                               FrameErrors& errors) const {
   double sum = 0, n = 0;
   for (int y0 = 0; y0 + kStillSide <= frame.height; y0 += kStillSide)
     for (int x0 = 0; x0 + kStillSide <= frame.width; x0 += kStillSide) {
@@ -221,8 +221,9 @@ void SequenceErrors::add_still(const Image& frame, const std::vector<Image>& ref
       for (int y = y0; y < y0 + kStillSide; ++y)
         for (int x = x0; x < x0 + kStillSide; ++x) {
           const size_t p = static_cast<size_t>(y) * frame.width + x;
-          finite = finite && is_finite(frame, references, p) && is_finite(before_, references_before_, p);
-          const double w = weight(references, p), w_change = std::min(w, weight(references_before_, p));
+          finite = finite && is_finite(frame, references, p) && is_finite(before_, references_before_, p) &&
+                   std::isfinite(weights[p] + weights_before_[p]);
+          const double w = weights[p], w_change = std::min(w, weights_before_[p]);
           for (size_t i = 3 * p; i < 3 * p + 3; ++i) {
             const double r1 = references.front().data[i], r2 = references.back().data[i], f = frame.data[i];
             change += w_change * (r1 - references_before_.front().data[i]) * (r2 - references_before_.back().data[i]);

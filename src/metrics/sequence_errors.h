@@ -2,7 +2,7 @@
 // Errors of animations F_t against references R_t: of frames, of the changes between them, and of regions.
 //
 // Errors are means over pixels and channels of products (F - R1)(F - R2) w, as for relMSE in metrics/metrics.h, with w
-// = 1 / (R'^2 + 0.01); with one reference R2 = R1.
+// the weight of relMSE, relative_weight(); with one reference R2 = R1.
 //     temporal error   (dF - dR1)(dF - dR2) w, dF = F_t - F_{t-1}: flicker and ghosting, but no constant bias. w is
 //     the smaller weight of the two frames, that of the brighter one, so that a light that appears is not weighted
 //     by the darkness before it.
@@ -46,17 +46,23 @@ struct FrameErrors {
 class SequenceErrors {
  public:
   /// Adds the next frame and its one or two references, all of the same size, 3 channels, linear RGB.
-  /// `low_dynamic_range`: see compute_metric(). Throws Error(kInput) if sizes differ, also from the frame before.
-  void add(Image frame, std::vector<Image> references, bool low_dynamic_range = false);
+  /// `low_dynamic_range`, `denominators`: see compute_metric(). Throws Error(kInput) if sizes differ, also
+  /// from the frame before.
+  void add(Image frame, std::vector<Image> references, bool low_dynamic_range = false,
+           std::vector<Image> denominators = {});
   const std::vector<FrameErrors>& frames() const { return frames_; }
 
  private:
-  void add_changes(const Image& frame, const std::vector<Image>& references, bool low_dynamic_range,
-                   FrameErrors& errors) const;
-  void add_still(const Image& frame, const std::vector<Image>& references, FrameErrors& errors) const;
+  /// The weights of a frame's squared errors, per pixel.
+  using Weights = std::vector<double>;
+  void add_changes(const Image& frame, const std::vector<Image>& references, const Weights& weights,
+                   bool low_dynamic_range, FrameErrors& errors) const;
+  void add_still(const Image& frame, const std::vector<Image>& references, const Weights& weights,
+                 FrameErrors& errors) const;
   std::vector<FrameErrors> frames_;
   Image before_;
   std::vector<Image> references_before_;
+  Weights weights_before_;
 };
 
 /// Per-frame means over renders with different seeds, regions included. Empty if there are no renders.

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The commands as a user runs them: results, messages, exit codes (0 done, 1 failed, 2 wrong usage), files left."""
 import json
+import math
 import os
 import resource
 import subprocess
@@ -118,7 +119,28 @@ class Compare(CliTest):
         self.image("r2.exr", (2, 2, 3))
         output = self.good("compare", "a.exr", "--reference", "ref.exr", "--reference2", "r2.exr").stdout
         self.assertIn("sum (F - R1).(F - R2)", output)
-        self.assertIn("%.6g" % (-0.25 / (3 * ((6.5 / 3) ** 2 + 0.01))), output)
+        weights = [1 / ((grey / 3) ** 2 + 0.01) for grey in (6, 7)]  # of each reference, here without noise
+        self.assertIn("%.6g" % (-0.25 / 3 * sum(weights) / 2), output)
+        self.assertIn("D' = mean of RGB of the denoised references", output)
+
+    def test_two_references_and_a_denominator(self):
+        for name, value in (("f.exr", 2.5), ("r1.exr", 1), ("r2.exr", 3), ("d.exr", 2)):
+            self.image(name, (value,) * 3)
+        two = ("compare", "f.exr", "--reference", "r1.exr", "--reference2", "r2.exr")
+        result = self.good(*two, "--denominator", "d.exr", "--json", "--metric", "relmse,mse,mae")
+        errors = json.loads(result.stdout)
+        self.assertAlmostEqual(errors["relmse"], -0.75 / 4.01, places=7)  # (2.5 - 1) (2.5 - 3)
+        # (F - R) (R1 - R2) = 0.5 * -2 in each of 12 pixels.
+        self.assertAlmostEqual(errors["relmse_reference_error"], 1 / 4.01 / math.sqrt(12), places=7)
+        self.assertAlmostEqual(errors["mse_reference_error"], 1 / math.sqrt(12), places=7)
+        self.assertNotIn("mae_reference_error", errors)
+        self.assertIn("warning: f.exr: the noise of the references makes the relmse of -0.187 uncertain by ±0.072",
+                      result.stderr)
+        self.assertIn("D' = mean of RGB of d.exr", self.good(*two, "--denominator", "d.exr").stdout)
+        self.bad(2, "--denominator is an option of relmse", *two, "--metric", "mse", "--denominator", "d.exr")
+        self.bad(2, "--denominator is an option of relmse", *two[:4], "--denominator", "d.exr")
+        self.image("part.exr", (2, 2, 2), window=(1, 1, 2, 2))
+        self.bad(1, "--denominator 'part.exr' does not cover 4 x 3 at (0, 0)", *two, "--denominator", "part.exr")
 
     def test_json_file(self):
         self.assertIn("relmse = ", self.good("compare", "a.exr", "--reference", "ref.exr", "--json", "o.json").stdout)
@@ -134,6 +156,7 @@ class Compare(CliTest):
         for image, reference in (("crop.exr", "full.exr"), ("full.exr", "crop.exr")):
             result = self.run_covary("compare", image, "--reference", reference, "--metric", "mse", "--json")
             errors = json.loads(result.stdout)
+            self.assertIn(f"{image}: compared over the pixels in common, 2 x 2 at (1, 1)", result.stderr)
             self.assertEqual(errors["window"], [1, 1, 2, 2])
             self.assertAlmostEqual(errors["mse"], 0.25)  # 5 6 9 10 against 5 6 9 11
         self.image("far.exr", (1, 1, 1), window=(3, 0, 1, 1))
