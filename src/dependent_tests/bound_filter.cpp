@@ -107,7 +107,7 @@ class Window {
       const vfloat excess = max(lambda - differences_[i], splat(0));
       const vfloat weighted = excess * load(precision_.weight.row(0, qy) + qx);
       side.slope += weighted;
-      side.sum += weighted * excess;
+      side.sum = fma(weighted, excess, side.sum);
     });
     return side;
   }
@@ -117,10 +117,10 @@ class Window {
     for_each([&](size_t i, int qy, int qx) {
       const vfloat excess = max(lambda - differences_[i], splat(0));
       const vfloat weighted = excess * load(precision_.weight.row(0, qy) + qx);
-      for (int c = 0; c < 3; ++c) colour[c] += weighted * load(input_.independent.row(c, qy) + qx);
+      for (int c = 0; c < 3; ++c) colour[c] = fma(weighted, load(input_.independent.row(c, qy) + qx), colour[c]);
       partners += weighted > splat(0) ? splat(1) : vfloat{};
       slope += weighted;
-      sum += weighted * excess;
+      sum = fma(weighted, excess, sum);
     });
     const vfloat own = max(lambda, splat(0)) * load(precision_.weight.row(0, y_) + x_);
     for (int l = 0; l < n; ++l) {

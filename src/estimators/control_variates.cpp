@@ -171,9 +171,9 @@ class Regression {
       S += penalty_sum(w.tail.data() + i * n_tail, layout_.group_variance, first);
       for (int c = first; c < first + count; ++c) {
         const vfloat missing = tail_value(w.tail.data() + i * n_tail, layout_.missing + c);
-        S += static_cast<float>(T_) * missing * missing;
+        S = fma(static_cast<float>(T_) * missing, missing, S);
         const vfloat g = w.x[static_cast<size_t>(i) * layout_.contrasts + layout_.group_contrasts + c];
-        N += g * g;
+        N = fma(g, g, N);
       }
     }
     const vfloat factor = lanes::sqrt(S / max(N, splat(1e-30f)) * (s_.mean_constraint * static_cast<float>(T_ - 1)));
@@ -209,7 +209,7 @@ class Regression {
         vfloat squares = {};
         for (int c = first; c < first + count; ++c) {
           const vfloat element = w.x[static_cast<size_t>(i) * layout_.contrasts + layout_.group_contrasts + c];
-          squares += element * element;
+          squares = fma(element, element, squares);
         }
         smallest = max(smallest, squares * (kSmallestPenalty / (s_.mean_constraint * static_cast<float>(T_ - 1))));
       }
@@ -248,7 +248,7 @@ class Regression {
           vfloat norm = {};
           for (int i = 0; i < k; ++i) {
             const vfloat element = w.gram[batch::packed(k + 1 + r, i)];
-            norm += element * element;
+            norm = fma(element, element, norm);
           }
           w.freedom -= norm;
         }
@@ -267,7 +267,7 @@ class Regression {
       batch::solve_shifted(w.gram.data(), w.shift.data(), rows, w.b.data(), w.inverse.data());
       for (int i = 0; i < k; ++i) {
         vfloat g = {};
-        for (int r = 0; r < rows; ++r) g += X[static_cast<size_t>(i) * all + r * step] * w.b[r];
+        for (int r = 0; r < rows; ++r) g = fma(X[static_cast<size_t>(i) * all + r * step], w.b[r], g);
         w.gamma[i] = g;
         w.beta[i] *= g;
       }
@@ -284,7 +284,8 @@ class Regression {
   void finish_channel(int c, int x, int y, int n_lanes, Workspace& w) const {
     const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
     vfloat estimate = load(in_.crn_moments->mean.row(c, y) + x);
-    for (int i = 0; i < k; ++i) estimate -= w.beta[i] * tail_value(w.tail.data() + i * n_tail, layout_.difference + c);
+    for (int i = 0; i < k; ++i)
+      estimate = fnma(w.beta[i], tail_value(w.tail.data() + i * n_tail, layout_.difference + c), estimate);
     // Squares of values above 10^18 overflow; such pixels take the independent image.
     for (int l = 0; l < n_lanes; ++l)
       result_.estimate.pixel(x + l, y)[c] = std::isfinite(estimate[l]) ? estimate[l] : in_.h->row(c, y)[x + l];
@@ -304,7 +305,8 @@ class Regression {
     const vfloat left = max(1.0f - w.freedom, splat(kFewestFreedom));
     vfloat missing = tail_value(w.y_tail.data(), layout_.missing + c);
     for (int i = 0; i < s_.k; ++i)
-      missing -= w.beta[i] * tail_value(w.tail.data() + i * (layout_.size - layout_.contrasts), layout_.missing + c);
+      missing = fnma(w.beta[i], tail_value(w.tail.data() + i * (layout_.size - layout_.contrasts), layout_.missing + c),
+                     missing);
     return squares / (static_cast<float>(T_ * (T_ - 1)) * left * left) + missing * missing;
   }
 
@@ -316,8 +318,8 @@ class Regression {
     vfloat own = {}, variances = {}, squares = {}, count = {};
     for (int i = 0; i < s_.k; ++i) {
       const vfloat variance = tail_value(w.tail.data() + i * n_tail, layout_.h_variance + c);
-      own += w.beta[i] * w.beta[i] * variance;
-      squares += w.beta[i] * w.beta[i];
+      own = fma(w.beta[i] * w.beta[i], variance, own);
+      squares = fma(w.beta[i], w.beta[i], squares);
       variances += variance;
       count += w.beta[i] != 0.0f ? splat(1.0f) : vfloat{};  // pixels outside the frame have no coefficient
     }

@@ -100,7 +100,7 @@ class Iduw {
         for_each_neighbour(x, y, [&](int qx, int qy) {
           const vfloat change = (a - load(z_half_[0].row(c, qy) + qx)) - (b - load(z_half_[1].row(c, qy) + qx));
           const vfloat weight = exp_of_nonpositive(-gamma * n_ * change * change);  // [Back2023], as in iduw.h
-          sum += weight * (centre - (load(z_.row(c, qy) + qx) - load(y_.row(c, qy) + qx)));
+          sum = fma(weight, centre - (load(z_.row(c, qy) + qx) - load(y_.row(c, qy) + qx)), sum);
         });
         const vfloat value = load(y_.row(c, y) + x) + normalise_ * sum;
         for (int l = 0; l < n; ++l) result.pixel(x + l, y)[c] = value[l];
@@ -134,7 +134,8 @@ class Iduw {
         const vfloat exponent = -n_ * change * change;
         const vfloat difference =
             centre[half] - (load(z_half_[half].row(c, qy) + qx) - load(y_half_[half].row(c, qy) + qx));
-        for (size_t i = 0; i < n; ++i) sums[2 * i + half] += exp_of_nonpositive(gammas[i] * exponent) * difference;
+        for (size_t i = 0; i < n; ++i)
+          sums[2 * i + half] = fma(exp_of_nonpositive(gammas[i] * exponent), difference, sums[2 * i + half]);
       }
     });
     box *= normalise_ * static_cast<float>(1.0 / (1.0 + normalise_));  // 1 / window^2

@@ -62,12 +62,12 @@ Difference guided_difference(const Moments& g, const Moments& h, const Planes& v
     const auto at = [=](const Planes& planes, int c) { return load(planes.row(c, qy) + qx); };
     if (h.relative_count) w *= at(*h.relative_count, 0);
     weights += w;
-    m0 += w * (at(h.mean, 0) - at(g.mean, 0));
-    m1 += w * (at(h.mean, 1) - at(g.mean, 1));
-    m2 += w * (at(h.mean, 2) - at(g.mean, 2));
+    m0 = fma(w, at(h.mean, 0) - at(g.mean, 0), m0);
+    m1 = fma(w, at(h.mean, 1) - at(g.mean, 1), m1);
+    m2 = fma(w, at(h.mean, 2) - at(g.mean, 2), m2);
     const vfloat v = at(variance_of_h, 0);
-    variance += w * w * v;
-    of_pixel += w * v;
+    variance = fma(w * w, v, variance);
+    of_pixel = fma(w, v, of_pixel);
   });
   return {{m0 / weights, m1 / weights, m2 / weights}, variance / (weights * weights), of_pixel / weights};
 }

@@ -28,9 +28,9 @@ Rgb guided_mean(const Moments& g, const Planes& image, const Planes* counts, int
     const Rgb v = load_rgb(image, qx, qy);
     if constexpr (kCounted) w *= load(counts->row(0, qy) + qx);
     weights += w;
-    sum.r += w * v.r;
-    sum.g += w * v.g;
-    sum.b += w * v.b;
+    sum.r = fma(w, v.r, sum.r);
+    sum.g = fma(w, v.g, sum.g);
+    sum.b = fma(w, v.b, sum.b);
   });
   const vfloat inverse = 1.0f / weights;  // the pixel itself has weight 1, or its count
   return {sum.r * inverse, sum.g * inverse, sum.b * inverse};

@@ -51,7 +51,7 @@ inline void gram_tile(const vfloat* X, ptrdiff_t row, ptrdiff_t sum, int n, int 
     for (int a = 0; a < NA; ++a)
 #pragma GCC unroll 8
       for (int b = 0; b < NB; ++b)
-        if (!diagonal || b <= a) c[a][b] += va[a] * vb[b];
+        if (!diagonal || b <= a) c[a][b] = lanes::fma(va[a], vb[b], c[a][b]);
   }
 #pragma GCC unroll 8
   for (int a = 0; a < NA; ++a)
@@ -82,7 +82,7 @@ inline void multiply(const vfloat* X, ptrdiff_t row, ptrdiff_t sum, const vfloat
       vfloat factor = y[s * sum];
       lanes::keep_in_register(factor);
 #pragma GCC unroll 8
-      for (int a = 0; a < N; ++a) sums[parity][a] += X[(i + a) * row + s * sum] * factor;
+      for (int a = 0; a < N; ++a) sums[parity][a] = lanes::fma(X[(i + a) * row + s * sum], factor, sums[parity][a]);
     };
     int s = 0;
     for (; s + 1 < n; s += 2) add(s, 0), add(s + 1, 1);
@@ -104,10 +104,10 @@ inline vfloat residual_squares(const vfloat* X, ptrdiff_t row, ptrdiff_t sum, co
       vfloat factor = gamma[i];
       lanes::keep_in_register(factor);
 #pragma GCC unroll 8
-      for (int a = 0; a < N; ++a) rest[a] -= factor * X[i * row + (s + a) * sum];
+      for (int a = 0; a < N; ++a) rest[a] = lanes::fnma(factor, X[i * row + (s + a) * sum], rest[a]);
     }
 #pragma GCC unroll 8
-    for (int a = 0; a < N; ++a) squares += rest[a] * rest[a];
+    for (int a = 0; a < N; ++a) squares = lanes::fma(rest[a], rest[a], squares);
   });
   return squares;
 }
@@ -140,7 +140,7 @@ inline void subtract_columns(const vfloat* G, int i0, int j0, vfloat (&c)[NA][NB
     for (int a = 0; a < NA; ++a)
 #pragma GCC unroll 8
       for (int b = 0; b < NB; ++b)
-        if (!diagonal || b <= a) c[a][b] -= va[a] * vb[b];
+        if (!diagonal || b <= a) c[a][b] = lanes::fnma(va[a], vb[b], c[a][b]);
   }
 }
 
@@ -153,13 +153,13 @@ inline void factor_diagonal(vfloat* G, const vfloat* shift, int j0, vfloat* inve
   for (int b = 0; b < NB; ++b) {
     vfloat pivot = c[b][b] + shift[j0 + b];
 #pragma GCC unroll 8
-    for (int p = 0; p < b; ++p) pivot -= c[b][p] * c[b][p];
+    for (int p = 0; p < b; ++p) pivot = lanes::fnma(c[b][p], c[b][p], pivot);
     const vfloat inverted = 1.0f / lanes::sqrt(lanes::max(pivot, shift[j0 + b]));
     inverse[j0 + b] = inverted;
 #pragma GCC unroll 8
     for (int a = b + 1; a < NB; ++a) {
 #pragma GCC unroll 8
-      for (int p = 0; p < b; ++p) c[a][b] -= c[a][p] * c[b][p];
+      for (int p = 0; p < b; ++p) c[a][b] = lanes::fnma(c[a][p], c[b][p], c[a][b]);
       c[a][b] *= inverted;
       G[packed(j0 + a, j0 + b)] = c[a][b];
     }
@@ -176,7 +176,7 @@ inline void factor_rows(vfloat* G, int i0, int j0, const vfloat* inverse) {
 #pragma GCC unroll 8
     for (int a = 0; a < NA; ++a) {
 #pragma GCC unroll 8
-      for (int p = 0; p < b; ++p) c[a][b] -= c[a][p] * G[packed(j0 + b, j0 + p)];
+      for (int p = 0; p < b; ++p) c[a][b] = lanes::fnma(c[a][p], G[packed(j0 + b, j0 + p)], c[a][b]);
       c[a][b] *= inverse[j0 + b];
       G[packed(i0 + a, j0 + b)] = c[a][b];
     }
@@ -189,7 +189,7 @@ inline void substitute_back(const vfloat* L, const vfloat* inverse, int m, vfloa
   for (int j = m - 1; j >= 0; --j) {
     const vfloat* const Lj = L + packed(j, 0);
     x[j] *= inverse[j];
-    for (int q = 0; q < j; ++q) x[q] -= Lj[q] * x[j];
+    for (int q = 0; q < j; ++q) x[q] = lanes::fnma(Lj[q], x[j], x[q]);
   }
 }
 
@@ -232,20 +232,20 @@ inline void inverse_squares(const vfloat* L, const vfloat* inverse, int m, int j
       lanes::keep_in_register(second);
 #pragma GCC unroll 8
       for (int c = 0; c < N; ++c) {
-        sums[c % 2][c] += first * columns[q * N + c];
-        sums[1 - c % 2][c] += second * columns[(q + 1) * N + c];
+        sums[c % 2][c] = lanes::fma(first, columns[q * N + c], sums[c % 2][c]);
+        sums[1 - c % 2][c] = lanes::fma(second, columns[(q + 1) * N + c], sums[1 - c % 2][c]);
       }
     }
     if (q < i)
 #pragma GCC unroll 8
-      for (int c = 0; c < N; ++c) sums[c % 2][c] += Li[q] * columns[q * N + c];
+      for (int c = 0; c < N; ++c) sums[c % 2][c] = lanes::fma(Li[q], columns[q * N + c], sums[c % 2][c]);
 #pragma GCC unroll 8
     for (int c = 0; c < N; ++c) {
       vfloat element = -(sums[0][c] + sums[1][c]) * inverse[i];
       if (i == j0 + c) element = inverse[i];
       if (i < j0 + c) element = vfloat{};
       row[c] = element;
-      total[c] += element * element;
+      total[c] = lanes::fma(element, element, total[c]);
     }
   }
 #pragma GCC unroll 8
@@ -266,12 +266,12 @@ inline vfloat inverse_trace(const vfloat* L, const vfloat* inverse, const vfloat
   for (; j + kColumnsAtOnce <= m; j += kColumnsAtOnce) {
     vfloat squares[kColumnsAtOnce];
     detail::inverse_squares<kColumnsAtOnce>(L, inverse, m, j, columns, squares);
-    for (int c = 0; c < kColumnsAtOnce; ++c) trace += weight[j + c] * squares[c];
+    for (int c = 0; c < kColumnsAtOnce; ++c) trace = lanes::fma(weight[j + c], squares[c], trace);
   }
   for (; j < m; ++j) {
     vfloat squares[1];
     detail::inverse_squares<1>(L, inverse, m, j, columns, squares);
-    trace += weight[j] * squares[0];
+    trace = lanes::fma(weight[j], squares[0], trace);
   }
   return trace;
 }

@@ -22,7 +22,7 @@ void GuidedCells::sum(int x, int y, vfloat* sums) const {
   std::fill_n(sums, count_, vfloat{});
   add_alike({cells_, 0, kRadius, kCell}, x, y / kCell, f, grey * grey + kLeastSquare,
             [&](vfloat w, int column, int row) {
-              for (int i = 0; i < count_; ++i) sums[i] += w * load(cells_.row(3 + i, row) + column);
+              for (int i = 0; i < count_; ++i) sums[i] = fma(w, load(cells_.row(3 + i, row) + column), sums[i]);
             });
 }
 

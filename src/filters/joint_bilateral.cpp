@@ -54,10 +54,10 @@ Image joint_bilateral(const Image& rgb, const Image& albedo, const Image& normal
             lanes::splat(static_cast<float>(dx * dx + dy * dy) * (-0.5f * lanes::kLog2E / sqr(kSpatial)));
         for (int c = 0; c < kGuides; ++c) {
           const lanes::vfloat difference = own[c] - at(c);
-          exponent -= difference * difference;
+          exponent = lanes::fnma(difference, difference, exponent);
         }
         const lanes::vfloat weight = lanes::exp2_of_nonpositive(exponent) * at(kFinite);
-        for (int c = 0; c < 3; ++c) sum[c] += weight * at(kGuides + c);
+        for (int c = 0; c < 3; ++c) sum[c] = lanes::fma(weight, at(kGuides + c), sum[c]);
         sum[3] += weight;
       }
     for (int c = 0; c < 3; ++c)

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vectors of kLanes floats, one lane per pixel, so that per-pixel algebra reads like scalar code. Compiler vector
 // extensions (GCC, Clang): plain operators, any instruction set. Lanes never interact, so results do not depend on
-// which pixels share a vector.
+// which pixels share a vector. Products and sums are fused only where the code says so (fma()): what a compiler chooses
+// to fuse depends on what else a function computes.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +10,7 @@
 #include <cstdint>
 #include <cstring>
 
-#if defined(__AVX512F__)
+#if defined(__AVX512F__) || defined(__FMA__)
 #include <immintrin.h>
 #elif defined(__SSE__)
 #include <xmmintrin.h>
@@ -44,6 +45,20 @@ inline void keep_in_register([[maybe_unused]] vfloat& v) {
 #endif
 }
 
+/// a b + c and c - a b, rounded once if the processor has such instructions.
+#if defined(__AVX512F__)
+inline vfloat fma(vfloat a, vfloat b, vfloat c) { return _mm512_fmadd_ps(a, b, c); }
+inline vfloat fnma(vfloat a, vfloat b, vfloat c) { return _mm512_fnmadd_ps(a, b, c); }
+#elif defined(__FMA__)
+inline vfloat fma(vfloat a, vfloat b, vfloat c) { return _mm256_fmadd_ps(a, b, c); }
+inline vfloat fnma(vfloat a, vfloat b, vfloat c) { return _mm256_fnmadd_ps(a, b, c); }
+#else
+inline vfloat fma(vfloat a, vfloat b, vfloat c) { return a * b + c; }
+inline vfloat fnma(vfloat a, vfloat b, vfloat c) { return c - a * b; }
+#endif
+
+inline vfloat squared_length(vfloat x, vfloat y, vfloat z) { return fma(x, x, fma(y, y, z * z)); }
+
 inline vint bits(vfloat v) { return reinterpret_cast<vint>(v); }
 inline vfloat from_bits(vint v) { return reinterpret_cast<vfloat>(v); }
 
@@ -76,7 +91,7 @@ inline vfloat sqrt(vfloat v) {
 inline vfloat reciprocal(vfloat v) {
 #ifdef __AVX512F__
   const vfloat r = _mm512_maskz_rcp14_ps(kAll, v);
-  return r + r * (1 - v * r);
+  return fma(r, fnma(v, r, splat(1)), r);
 #else
   return 1 / v;
 #endif
@@ -105,11 +120,11 @@ inline vfloat exp2_of_nonpositive(vfloat x) {
   // 2^x = 2^f 2^n with f in [-1/2, 1/2]. Minimax polynomial (relative error) with p(0) = 1.
   const auto of_fraction = [](vfloat f) {
     vfloat p = splat(1.32647273e-3f);
-    p = p * f + 9.67151299e-3f;
-    p = p * f + 5.55073358e-2f;
-    p = p * f + 2.40222424e-1f;
-    p = p * f + 6.93147004e-1f;
-    return p * f + 1.0f;
+    p = fma(p, f, splat(9.67151299e-3f));
+    p = fma(p, f, splat(5.55073358e-2f));
+    p = fma(p, f, splat(2.40222424e-1f));
+    p = fma(p, f, splat(6.93147004e-1f));
+    return fma(p, f, splat(1.0f));
   };
 #ifdef __AVX512F__
   x = max(x, splat(-200.0f));

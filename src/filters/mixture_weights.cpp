@@ -51,7 +51,7 @@ void solve_mixture(int m, const vfloat* sums, const float* prior, float strength
         const vfloat step = min(max(wanted, -x[p]), x[q]);
         x[p] += step;
         x[q] -= step;
-        for (int i = 0; i < m; ++i) gradient[i] += step * (element(i, p) - element(i, q));
+        for (int i = 0; i < m; ++i) gradient[i] = fma(step, element(i, p) - element(i, q), gradient[i]);
       }
 }
 

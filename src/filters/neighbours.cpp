@@ -33,7 +33,7 @@ KeyRange make_keys(const Planes& guide, int x, int y, std::span<const Offset> of
   for (int j = 0; j < static_cast<int>(offsets.size()); ++j) {
     const float* const there = here + (offsets[j].dy * stride + offsets[j].dx);
     const vfloat d0 = load(there) - f0, d1 = load(there + plane) - f1, d2 = load(there + 2 * plane) - f2;
-    const vint key = (bits(d0 * d0 + d1 * d1 + d2 * d2) & ~index_mask) | j;
+    const vint key = (bits(squared_length(d0, d1, d2)) & ~index_mask) | j;
     keys[j] = key;
     if (j > 0) range.smallest = key < range.smallest ? key : range.smallest;
     range.largest = key > range.largest ? key : range.largest;

@@ -49,8 +49,8 @@ PairSums pixel_sums(const float* f, const float* variance, ptrdiff_t there) {
     vfloat v = load(variance), u = load(variance + there);
     keep_in_register(v), keep_in_register(u);
     const vfloat quotient = reciprocal(v + u);
-    sum.a += (difference * difference - min(v, u)) * quotient;
-    sum.b += v * quotient;
+    sum.a = fma(fma(difference, difference, -min(v, u)), quotient, sum.a);
+    sum.b = fma(v, quotient, sum.b);
   }
   return sum;
 }
@@ -255,7 +255,7 @@ class Filter {
       const float* q = guides + x;
       for (int i = 0; i < count; ++i, q += plane) {
         const vfloat difference = load(q) - load(q + there);
-        sum += difference * difference;
+        sum = fma(difference, difference, sum);
       }
       const vfloat likeness = exp2_of_nonpositive(sum * -kLog2E);
       store(forward + x, likeness * load(other_mask + x));
@@ -354,7 +354,7 @@ class Filter {
         for (int c = 0; c < 3; ++c) {
           vfloat value = load(values + c * kPlane + sign * k + x);
           keep_in_register(value);
-          for (int i = 0; i < n; ++i) sum[i][c] += weight[i] * value;
+          for (int i = 0; i < n; ++i) sum[i][c] = fma(weight[i], value, sum[i][c]);
         }
       }
       for (int i = 0; i < n; ++i)

@@ -124,7 +124,7 @@ class Regression {
         const vfloat mask = load(mask_.row(there.residue, y + dy) + x + there.column);
         vfloat& root = w.roots[(dy + kRadius) * kSide + dx + kRadius];
         root = column < static_cast<float>(columns_) ? root_of_weight(x, y, dx, dy) * mask : vfloat{};
-        total += root * root;
+        total = fma(root, root, total);
       }
     }
     std::vector<Terms> planes(static_cast<size_t>(3 * n_sources_));
@@ -141,7 +141,7 @@ class Regression {
         for (int c = 0; c < 3; ++c) {
           const vfloat difference = value(c, own, x, y + py) - value(c, other, x, y + dy + py);
           const vfloat v = value(3 + c, own, x, y + py), u = value(3 + c, other, x, y + dy + py);
-          sum += (difference * difference - v - min(v, u)) * reciprocal(v + u);
+          sum = fma(fma(difference, difference, -v) - min(v, u), reciprocal(v + u), sum);
         }
     }
     return exp2_of_nonpositive(min(sum * (-0.5f * kLog2E / (kOfPatch * kBandwidth * kBandwidth)), vfloat{}));
@@ -191,7 +191,7 @@ class Regression {
     }
     // From differences to the centres to values.
     for (Terms& plane : planes)
-      for (int a = 3; a < n; ++a) plane[0] -= plane[a] * value(3 + a, Place(0), x, y);
+      for (int a = 3; a < n; ++a) plane[0] = fnma(plane[a], value(3 + a, Place(0), x, y), plane[0]);
   }
 
   /// Adds the models' predictions for the pixels of row y + dy to `row` of the sums.
@@ -205,9 +205,9 @@ class Regression {
       const vfloat root = w.roots[(dy + kRadius) * kSide + k], weight = root * root;
       for (int c = 0; c < 3 * n_sources_; ++c) {
         const Terms& plane = planes[c];
-        vfloat prediction = plane[0] + plane[1] * (static_cast<float>(k - kRadius) / kPlaceUnit) +
-                            plane[2] * (static_cast<float>(dy) / kPlaceUnit);
-        for (int a = 3; a < n_terms_; ++a) prediction += plane[a] * value(3 + a, place, x, y + dy);
+        vfloat prediction = fma(plane[1], splat(static_cast<float>(k - kRadius) / kPlaceUnit), plane[0]);
+        prediction = fma(plane[2], splat(static_cast<float>(dy) / kPlaceUnit), prediction);
+        for (int a = 3; a < n_terms_; ++a) prediction = fma(plane[a], value(3 + a, place, x, y + dy), prediction);
         add(c, place, weight * prediction);
       }
       add(3 * n_sources_, place, weight);

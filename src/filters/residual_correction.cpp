@@ -59,11 +59,11 @@ GuidedMean guided_mean(const Planes& cells, int radius, int x, int y, const vflo
   vfloat weights = {}, squares = {}, r0 = {}, r1 = {}, r2 = {};
   add_alike<3>({cells, kGuide, radius, side}, x, y / side, f, squared_bandwidth, [&](vfloat w, int column, int row) {
     const auto at = [&](int plane) { return load(cells.row(plane, row) + column); };
-    weights += w * at(kWeight);
-    squares += w * w * at(kVariance);
-    r0 += w * at(kResidual);
-    r1 += w * at(kResidual + 1);
-    r2 += w * at(kResidual + 2);
+    weights = fma(w, at(kWeight), weights);
+    squares = fma(w * w, at(kVariance), squares);
+    r0 = fma(w, at(kResidual), r0);
+    r1 = fma(w, at(kResidual + 1), r1);
+    r2 = fma(w, at(kResidual + 2), r2);
   });
   return {weights, {r0, r1, r2}, squares};
 }

@@ -29,7 +29,7 @@ template <int kAtOnce = 1, typename Add>
     for (int c = 0; c < 3; ++c) p[c] = window.guide.row(window.first + c, row) + x;
     const auto exponent = [&](int dx) {
       const vfloat d0 = load(p[0] + dx) - c0, d1 = load(p[1] + dx) - c1, d2 = load(p[2] + dx) - c2;
-      return (d0 * d0 + d1 * d1 + d2 * d2) * factor;
+      return squared_length(d0, d1, d2) * factor;
     };
     int dx = -reach;
     for (; dx + (kAtOnce - 1) * window.step <= reach; dx += kAtOnce * window.step) {

@@ -78,11 +78,8 @@ class Combine(CliTest):
         self.assertGreater(statistics["rank_correlation"]["crn_horizontal"]["value"], 0.5)
         self.assertLess(abs(statistics["rank_correlation"]["independent_horizontal"]["value"]), 0.1)
         self.assertEqual(result.stderr, "")
-        # Half of the samples by themselves, and all of them: the image has neither more layers nor other bits for it.
+        # Half of the samples by themselves, and all of them.
         self.assertLess(4 * statistics["predicted_relmse"], statistics["independent_predicted_relmse"])
-        self.good("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "plain.exr", "--quiet")
-        out, plain = self.read("out.exr"), self.read("plain.exr")
-        self.assertEqual(out, plain)
         info = self.good("info", "out.exr").stdout
         self.assertIn("covary:estimator: iicv", info)
         self.assertIn("covary:samples: 192", info)
@@ -120,16 +117,6 @@ class Combine(CliTest):
         self.good("combine", "--crn", "named.exr", "--crn-layer", "pass.", "--independent", "independent.exr", "-o",
                   "c.exr", "--quiet")
         self.assertEqual(self.read("a.exr"), self.read("c.exr"))
-
-    def test_bands_and_threads_give_the_same_bits(self):
-        size = (16, 200)
-        self.layers("tall_crn.exr", noisy(1, True, 4, size), size)
-        self.layers("tall_independent.exr", noisy(2, False, 4, size), size)
-        common = ["combine", "--crn", "tall_crn.exr", "--independent", "tall_independent.exr", "--error", "--quiet"]
-        self.good(*common, "-o", "whole.exr")
-        # 16 * (12 * 8 + 160) bytes per row: 0.4 MiB holds 102 rows.
-        self.good(*common, "-o", "bands.exr", "--memory", "0.4", "--threads", "1")
-        self.assertEqual(self.read("whole.exr"), self.read("bands.exr"))
 
     def test_bands_count_each_pixel_once(self):
         size = (16, 200)
@@ -176,21 +163,6 @@ class Combine(CliTest):
                  "--denoise", "balanced", "--oidn", "off", "--memory", "200")
         self.bad(2, "the limit is 200.0 MB: use less, or raise it by the environment variable COVARY_MEMORY",
                  *large, "--estimator", "iduw", env=os.environ | {"COVARY_MEMORY": "0.2"})
-
-    def test_estimators_differ(self):
-        results = []
-        for options in ([], ["--paper"], ["--variance", "sample"],
-                        ["--coefficients", "per-channel"],
-                        ["--asymmetric"], ["--exclude-target"], ["--k", "9"], ["--window", "7"],
-                        ["--residual-correction", "off"],
-                        ["--estimator", "cv-baseline"], ["--estimator", "cv-baseline", "--ridge", "0.1"],
-                        ["--estimator", "iduw"], ["--estimator", "iduw", "--window", "7"]):
-            self.good("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "out.exr", "--quiet",
-                      *options)
-            results.append(self.read("out.exr"))
-        for i, a in enumerate(results):
-            for b in results[:i]:
-                self.assertNotEqual(a, b)
 
     def test_checks_refuse_and_can_be_forced(self):
         inputs = ["--crn", "independent.exr", "--independent", "crn.exr", "-o", "out.exr"]

@@ -7,7 +7,7 @@ import unittest
 
 import covary
 import numpy
-from common import GROUPS, HEIGHT, PROGRAM, WIDTH, PackageTest, channels, noisy, pair, rgb
+from common import GROUPS, HEIGHT, PROGRAM, WIDTH, PackageTest, noisy, pair
 from exr_writer import exr
 
 
@@ -19,11 +19,6 @@ class FilesTest(PackageTest):
             layers = {f"group{g:02}.{c}": image[:, :, i].ravel().tolist()
                       for g, image in enumerate(images) for i, c in enumerate("RGB")}
             (self.path / f"{name}.exr").write_bytes(exr(layers, (WIDTH, HEIGHT)))
-
-    def combine_files(self, *options):
-        self.run_program("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "out.exr", "--quiet",
-                         *options)
-        return self.path / "out.exr"
 
 
 class Changed(FilesTest):
@@ -40,27 +35,6 @@ class Changed(FilesTest):
 
 
 class Combine(FilesTest):
-    def test_bits_of_the_program(self):
-        result = covary.combine(self.crn, self.independent)
-        path = self.combine_files("--error")
-        self.assert_same_bits(result.image.reshape(-1, 3), rgb(path))
-        self.assert_same_bits(result.std_error.reshape(-1, 3), channels(path, [f"StdError.{c}" for c in "RGB"]))
-        self.assert_same_bits(result.bias.reshape(-1, 3), channels(path, [f"Bias.{c}" for c in "RGB"]))
-
-    def test_options(self):
-        for options, words in (({"paper": True}, ["--paper"]), ({"k": 9, "penalty": "sample", "window": 9},
-                                ["--k", 9, "--penalty", "sample", "--window", 9]),
-                               ({"residual_correction": "off"}, ["--feedback", "off"])):
-            result = covary.combine(self.crn, self.independent, **options)
-            self.assert_same_bits(result.image.reshape(-1, 3), rgb(self.combine_files(*words)))
-
-    def test_every_estimator(self):
-        for name in ("cv-baseline", "iduw", "dependent-tests"):
-            more = {"samples": 96} if name == "iduw" else {}
-            result = covary.combine(self.crn, self.independent, name, **more)
-            path = self.combine_files("--estimator", name, *(["--samples", 96] if more else []))
-            self.assert_same_bits(result.image.reshape(-1, 3), rgb(path))
-
     def test_files_as_arrays(self):
         self.assert_same_bits(covary.read_groups(self.path / "crn.exr"), self.crn)
         self.assertEqual(self.message_of(ValueError, covary.read_groups, []),
