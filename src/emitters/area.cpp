@@ -13,6 +13,13 @@
 #include "scene/mesh.h"
 
 namespace covary {
+namespace {
+
+/// Unit geometric normal on the side of the shading normal: the front that the BSDF has, too, whatever the order of a
+/// mesh's vertices.
+Vec3 front_normal(const SurfaceHit& hit) { return dot(hit.ng, hit.frame.n) < 0 ? -hit.ng : hit.ng; }
+
+}  // namespace
 
 AreaLight::AreaLight(TexturePtr radiance) : radiance_(std::move(radiance)), textured_(!radiance_->is_constant()) {
   if (!textured_) constant_ = radiance_->eval(SurfaceHit{});
@@ -29,7 +36,7 @@ void AreaLight::attach(const Shape* shape) {
 }
 
 Spectrum AreaLight::surface_radiance(const SurfaceHit& hit, const Vec3& w) const {
-  if (!(dot(hit.ng, w) > 0)) return Spectrum();
+  if (!(dot(front_normal(hit), w) > 0)) return Spectrum();
   return textured_ ? radiance_->eval(hit) : constant_;
 }
 
@@ -108,7 +115,7 @@ EmissionSample AreaLight::sample_emission(Vec2 u_position, Vec2 u_direction, flo
 EmissionPdf AreaLight::pdf_emission(const SurfaceHit& hit, const Vec3& w) const {
   const float position =
       samples_uv_ ? radiance_->pdf_position(hit.uv) * shape_->sample_uv(hit.uv).pdf_area : 1 / shape_->area();
-  return {position, warp::cosine_hemisphere_pdf_solid_angle(dot(hit.ng, w))};
+  return {position, warp::cosine_hemisphere_pdf_solid_angle(dot(front_normal(hit), w))};
 }
 
 template <typename Position>

@@ -18,7 +18,8 @@ namespace covary {
 
 class AreaLight final : public Emitter {
  public:
-  /// `radiance` must not be null. Emits uniformly over the hemisphere on the side of the geometric normal.
+  /// `radiance` must not be null. Emits uniformly over the hemisphere of the geometric normal on the side of the
+  /// shading normal.
   explicit AreaLight(TexturePtr radiance);
 
   /// Sets the shape that emits; call once, when the shape is complete, before anything else but clone(). `shape` must

@@ -103,6 +103,43 @@ AreaSample inside_sphere(
   return {Vec3{1, 0, 0} + d * 3, -d, uv, 1 / (2 * kPi * kPi * 9 * sine)};
 }
 
+/// A square seen counter-clockwise from +z, with vertex normals towards -z: its front is where Mitsuba and pbrt have it,
+/// at z < 0, however light is sampled. As one parallelogram, and as two triangles.
+TEST(AreaLight, ShinesOnTheSideOfTheVertexNormals) {
+  for (const bool with_uvs : {true, false}) {
+    MeshData data;
+    data.positions = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
+    data.normals.assign(4, {0, 0, -1});
+    if (with_uvs) data.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    data.triangles = {{0, 1, 2}, {2, 3, 0}};
+    TriangleMesh mesh(data);
+    mesh.prepare_sampling();
+    AreaLight light(constant());
+    light.attach(&mesh);
+    ASSERT_EQ(light.parallelogram() != nullptr, with_uvs);
+    if (with_uvs) EXPECT_EQ(light.parallelogram()->surface.n.z, -1);
+
+    SurfaceHit hit;
+    hit.shape = &mesh, hit.barycentric = {0.25f, 0.5f};
+    mesh.fill({}, hit, false);
+    EXPECT_EQ(hit.ng.z, 1);
+    EXPECT_EQ(light.surface_radiance(hit, {0, 0, 1}).r, 0);
+    EXPECT_EQ(light.surface_radiance(hit, {0, 0, -1}).r, 1);
+    EXPECT_EQ(light.pdf_emission(hit, {0, 0, 1}).direction, 0);
+    EXPECT_FLOAT_EQ(light.pdf_emission(hit, {0, 0, -1}).direction, 1 / kPi);
+
+    EXPECT_EQ(light.sample_towards({0, 0, 3}, {0.3f, 0.4f}, 0.2f).radiance.r, 0);
+    const EmitterSample below = light.sample_towards({0, 0, -3}, {0.3f, 0.4f}, 0.2f);
+    EXPECT_EQ(below.radiance.r, 1);
+    EXPECT_EQ(below.n.z, -1);
+    EXPECT_EQ(light.sample_part_towards(0, {0, 0, -3}, {0.3f, 0.4f}, 0.2f).radiance.r, 1);
+    const EmissionSample leaving = light.sample_emission({0.3f, 0.4f}, {0.6f, 0.7f}, 0.2f);
+    EXPECT_LT(leaving.ray.d.z, 0);
+    EXPECT_FLOAT_EQ(light.pdf_emission(point_on_light(leaving.ray.o, leaving.n, leaving.uv), leaving.ray.d).direction,
+                    leaving.pdf_direction);
+  }
+}
+
 struct Case {
   const char* name;
   LightScene (*make)();

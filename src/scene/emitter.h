@@ -20,9 +20,9 @@ namespace covary {
 struct EmitterSample {
   Vec3 wi;                     ///< unit direction from the reference point to the light
   float distance = kInfinity;  ///< to the light; infinite for environments and directional lights
-  Vec3 p, n;                   ///< point and unit geometric normal on the light (unset when infinitely far)
-  Vec2 uv;                     ///< surface parameters of p (area lights)
-  float offset = 0;            ///< as SurfaceHit::offset; 0: not on a surface
+  Vec3 p, n;         ///< point on the light and unit geometric normal of the side that emits, unless infinitely far
+  Vec2 uv;           ///< surface parameters of p (area lights)
+  float offset = 0;  ///< as SurfaceHit::offset; 0: not on a surface
   /// Emitted towards the reference point; for delta lights, the irradiance on a surface facing wi, already divided by
   /// the squared distance.
   Spectrum radiance;
@@ -33,9 +33,9 @@ struct EmitterSample {
 
 /// Start of a light path.
 struct EmissionSample {
-  Ray ray;            ///< leaves the light
-  Vec3 n;             ///< unit geometric normal at the origin; the direction itself for point-like and infinite lights
-  Vec2 uv;            ///< surface parameters of the origin (area lights)
+  Ray ray;  ///< leaves the light
+  Vec3 n;   ///< unit normal at the origin, on the emitting side; the direction for point-like and infinite lights
+  Vec2 uv;  ///< surface parameters of the origin (area lights)
   float offset = 0;   ///< as SurfaceHit::offset, of the origin; 0: not on a surface
   Spectrum radiance;  ///< emitted radiance (area, environment) or intensity (point-like)
   /// Per unit area; for infinite lights per unit area of the disk perpendicular to the ray; 1 if delta.

@@ -66,6 +66,16 @@ TriangleMesh::TriangleMesh(MeshData data)
   parallelogram_ = find_parallelogram();
 }
 
+int TriangleMesh::front_side(const std::array<uint32_t, 3>& triangle, const Vec3& n) const {
+  if (!has_normals_) return 1;
+  bool front = false, back = false;
+  for (const uint32_t index : triangle) {
+    const float cosine = dot(vertices_[index].n, n);
+    front |= cosine > 0, back |= cosine < 0;
+  }
+  return front && back ? 0 : (back ? -1 : 1);
+}
+
 Parallelogram TriangleMesh::find_parallelogram() const {
   if (triangles_.size() != 2 || !has_uvs_) return {};
   // Each triangle must have three corners of the unit square in (u, v), and the missing corners must be opposite.
@@ -98,6 +108,9 @@ Parallelogram TriangleMesh::find_parallelogram() const {
   const auto& s = triangles_[1];
   const Vec3 other = cross(vertices_[s[1]].p - vertices_[s[0]].p, vertices_[s[2]].p - vertices_[s[0]].p);
   if (!(dot(other, result.n) > 0)) return {};
+  const int side = front_side(t, result.n);
+  if (side == 0 || side != front_side(s, result.n)) return {};
+  result.n = result.n * static_cast<float>(side);
   result.inverse_area = 1 / length(cross(result.dp_du, result.dp_dv));
   const Vec3 reach = abs(result.dp_du) + abs(result.dp_dv);
   result.slack = plane_slack(reach, result.dp_du, result.dp_dv, result.inverse_area);
@@ -132,8 +145,11 @@ void TriangleMesh::prepare_sampling() {
     const Vec3 e1 = v1.p - v0.p, e2 = v2.p - v0.p, normal = cross(e1, e2);
     const float inverse = 1 / length(normal);
     // Without texture coordinates, the surface parameters are the barycentric coordinates.
-    facets_.push_back({v0.p, e1, e2, normal * inverse, v0.uv, has_uvs_ ? v1.uv - v0.uv : Vec2{1, 0},
-                       has_uvs_ ? v2.uv - v0.uv : Vec2{0, 1}, plane_slack(abs(e1) + abs(e2), e1, e2, inverse)});
+    const Vec3 n = normal * inverse;
+    const int side = front_side(t, n);
+    facets_.push_back({v0.p, e1, e2, side < 0 ? -n : n, v0.uv, has_uvs_ ? v1.uv - v0.uv : Vec2{1, 0},
+                       has_uvs_ ? v2.uv - v0.uv : Vec2{0, 1}, plane_slack(abs(e1) + abs(e2), e1, e2, inverse),
+                       side != 0});
     areas.push_back(0.5f * length(normal));
   }
   areas_ = Discrete(areas);
@@ -176,10 +192,20 @@ void TriangleMesh::fill(const Ray& /*ray*/, SurfaceHit& hit, bool with_derivativ
 AreaSample TriangleMesh::sample_area(Vec2 u, float u_primitive) const {
   // One map for the whole parallelogram is cheaper than choosing a triangle, and continuous.
   if (is_parallelogram()) return TriangleMesh::sample_uv(u);
-  const uint32_t triangle = areas_.sample(u_primitive).index;
+  AreaSample at = sample_facet(areas_.sample(u_primitive).index, u);
+  at.pdf_area = inverse_area_;
+  return at;
+}
+
+AreaSample TriangleMesh::sample_facet(uint32_t triangle, Vec2 u) const {
   const Facet& facet = facets_[triangle];
   const Vec2 b = warp::square_to_triangle(u);
-  return {facet.point(b), facet.n, facet.uv_at(b), inverse_area_, triangle, b, facet.slack};
+  AreaSample at = {facet.point(b), facet.n, facet.uv_at(b), 0, triangle, b, facet.slack};
+  if (facet.one_front) return at;
+  const auto& t = triangles_[triangle];
+  if (dot(vertices_[t[0]].n * (1 - b.x - b.y) + vertices_[t[1]].n * b.x + vertices_[t[2]].n * b.y, at.n) < 0)
+    at.n = -at.n;
+  return at;
 }
 
 float TriangleMesh::part_area(uint32_t part) const {
@@ -188,9 +214,9 @@ float TriangleMesh::part_area(uint32_t part) const {
 
 AreaSample TriangleMesh::sample_part(uint32_t part, Vec2 u) const {
   if (is_parallelogram()) return TriangleMesh::sample_uv(u);
-  const Facet& facet = facets_[part];
-  const Vec2 b = warp::square_to_triangle(u);
-  return {facet.point(b), facet.n, facet.uv_at(b), 1 / part_area(part), part, b, facet.slack};
+  AreaSample at = sample_facet(part, u);
+  at.pdf_area = 1 / part_area(part);
+  return at;
 }
 
 Bounds3 TriangleMesh::part_bounds(uint32_t part) const {
@@ -200,7 +226,10 @@ Bounds3 TriangleMesh::part_bounds(uint32_t part) const {
   return bounds;
 }
 
-Vec3 TriangleMesh::part_normal(uint32_t part) const { return is_parallelogram() ? parallelogram_.n : facets_[part].n; }
+Vec3 TriangleMesh::part_normal(uint32_t part) const {
+  if (is_parallelogram()) return parallelogram_.n;
+  return facets_[part].one_front ? facets_[part].n : Vec3{};
+}
 
 EmitterSample TriangleMesh::sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const {
   return towards(reference, TriangleMesh::sample_area(u, u_primitive));

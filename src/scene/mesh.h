@@ -91,13 +91,17 @@ class TriangleMesh final : public Shape {
 
   /// Precomputed triangle data for sampling.
   struct Facet {
-    Vec3 p, e1, e2, n;  // point = p + b1 e1 + b2 e2
+    Vec3 p, e1, e2, n;  // point = p + b1 e1 + b2 e2; n is AreaSample::n
     Vec2 uv, duv1, duv2;
     float slack;
+    bool one_front;  // false: vertex normals on both sides, so that n is right on a part of the triangle alone
     Vec3 point(Vec2 b) const { return p + (e1 * b.x + e2 * b.y); }
     Vec2 uv_at(Vec2 b) const { return uv + duv1 * b.x + duv2 * b.y; }
   };
   std::vector<Facet> facets_;  // one per triangle after prepare_sampling()
+  /// Whether all vertex normals of the triangle, with normal `n`, are on the front (1) or on the back (-1); else 0.
+  int front_side(const std::array<uint32_t, 3>& triangle, const Vec3& n) const;
+  AreaSample sample_facet(uint32_t triangle, Vec2 u) const;
   Discrete areas_;
   float inverse_area_ = 0;
 

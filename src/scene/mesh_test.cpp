@@ -100,6 +100,40 @@ TEST(TriangleMesh, SamplesProportionallyToArea) {
   EXPECT_EQ(left, 600);  // areas 1 and 1.5
 }
 
+/// Two triangles seen counter-clockwise from +z, the second with vertex normals towards -z, and one with normals on both
+/// sides: every sample lies on the side of the normal that a hit there has, as in Mitsuba 3 (mesh.cpp) and pbrt-v4
+/// (FaceForward in triangle interactions).
+TEST(TriangleMesh, SamplesTheSideOfTheVertexNormals) {
+  MeshData data;
+  const Vec3 up = {0, 0, 1}, down = {0, 0, -1};
+  for (const float x : {0.0f, 10.0f, 20.0f})
+    data.positions.insert(data.positions.end(), {{x, 0, 0}, {x + 2, 0, 0}, {x, 2, 0}});
+  data.normals = {up, up, up, down, down, down, up, up, down};
+  data.triangles = {{0, 1, 2}, {3, 4, 5}, {6, 7, 8}};
+  for (const bool flip : {false, true}) {
+    data.flip_normals = flip;
+    TriangleMesh mesh(data);
+    mesh.prepare_sampling();
+    expect_near(mesh.part_normal(0), flip ? down : up);
+    expect_near(mesh.part_normal(1), flip ? up : down);
+    expect_near(mesh.part_normal(2), {});  // varies
+    int n_up = 0;
+    for (int i = 0; i < 600; ++i) {
+      const float x = (static_cast<float>(i) + 0.5f) / 600;
+      for (const AreaSample& sample :
+           {mesh.sample_area({x, 0.3f}, x), mesh.sample_part(static_cast<uint32_t>(i % 3), {x, 0.7f})}) {
+        SurfaceHit hit;
+        hit.shape = &mesh, hit.primitive = sample.primitive, hit.barycentric = sample.barycentric;
+        mesh.fill({}, hit, false);
+        expect_near(sample.n, dot(hit.ng, hit.frame.n) < 0 ? -hit.ng : hit.ng);
+        EXPECT_GT(dot(sample.n, hit.frame.n), 0);
+        n_up += sample.n.z > 0 && sample.primitive == 2;
+      }
+    }
+    EXPECT_GT(n_up, 0);
+  }
+}
+
 TEST(TriangleMesh, RejectsBrokenData) {
   MeshData data = right_triangle();
   data.triangles.push_back({0, 1, 3});

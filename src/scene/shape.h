@@ -18,7 +18,7 @@
 namespace covary {
 
 struct AreaSample {
-  Vec3 p, n;  ///< point and unit geometric normal
+  Vec3 p, n;  ///< point and unit geometric normal on the side of the shading normal
   Vec2 uv;
   float pdf_area = 0;      ///< per unit area
   uint32_t primitive = 0;  ///< triangle index within a mesh
@@ -45,7 +45,7 @@ class Shape : public SceneObject {
   virtual AreaSample sample_part(uint32_t /*part*/, Vec2 u) const { return sample_area(u, 0); }
   /// Bounds of one part, for spatial grouping.
   virtual Bounds3 part_bounds(uint32_t /*part*/) const { return bounds(); }
-  /// Unit geometric normal of a flat part; zero if it varies.
+  /// The AreaSample::n of a flat part; zero if it varies.
   virtual Vec3 part_normal(uint32_t /*part*/) const { return {}; }
   /// Point with given surface parameters (for textured lights): only for shapes whose (u, v) cover the unit square
   /// once. Its pdf_area is for a density of 1 per unit (u, v) area; pdf_area == 0: not supported by this shape.

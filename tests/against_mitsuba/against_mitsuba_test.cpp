@@ -154,6 +154,9 @@ TEST(AgainstMitsuba, Lights) { check("lights", "tests/against_mitsuba/lights.xml
 /// The reference is of scalar_rgb, 512 samples per pixel.
 TEST(AgainstMitsuba, Plugins) { check("plugins", "tests/against_mitsuba/plugins.xml"); }
 
+/// Sides that meshes emit and reflect on. Made as the others are, with --pixels 1792.
+TEST(AgainstMitsuba, Sides) { check("sides", "tests/against_mitsuba/sides.xml"); }
+
 TEST(AgainstMitsuba, MissingReferenceFails) {
   try {
     read_reference("no-such-scene");
