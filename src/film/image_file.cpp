@@ -14,6 +14,7 @@
 
 #include "core/memory_limit.h"
 #include "imageio/exr_image.h"
+#include "imageio/exr_picture.h"
 #include "imageio/image_io.h"
 
 namespace covary {
@@ -30,8 +31,6 @@ std::string lower(std::string text) {
 
 /// Suffixes renderers use for the channels of a colour, in lower case.
 constexpr std::array kSuffixes = {std::array{"r", "g", "b"}, std::array{"red", "green", "blue"}};
-/// Names renderers give their picture among the layers, in lower case (docs/other-renderers.md).
-constexpr std::array kPictures = {"combined", "ci", "c", "rgba", "rgb", "beauty"};
 
 using Suffixes = std::array<const char*, 3>;
 
@@ -211,8 +210,7 @@ const ColourLayer* find_picture(std::span<const ColourLayer> layers) {
   if (layers.size() == 1) return &layers[0];
   const ColourLayer* picture = nullptr;
   for (const ColourLayer& layer : layers) {
-    if (std::find(kPictures.begin(), kPictures.end(), lower(std::string(last_part(layer.name)))) == kPictures.end())
-      continue;
+    if (!names_picture(layer.name)) continue;
     if (picture) return nullptr;
     picture = &layer;
   }

@@ -4,14 +4,13 @@
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
-#include <OpenEXR/ImfInputFile.h>
+#include <OpenEXR/ImfInputPart.h>
+#include <OpenEXR/ImfMultiPartInputFile.h>
 #include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfStringAttribute.h>
-#include <OpenEXR/ImfTestFile.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstdint>
 #include <cstdio>
@@ -22,6 +21,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "imageio/exr_picture.h"
 
 namespace covary {
 namespace Imf = OPENEXR_IMF_NAMESPACE;
@@ -29,33 +29,32 @@ namespace {
 
 constexpr int kMaxSize = 1 << 18;  // pixels per side; larger images are left to OpenImageIO
 
-/// The file's channels in the order of ImageHeader; empty if open_plain_exr() does not support them.
-std::vector<std::string> plain_channels(const Imf::ChannelList& channels) {
-  std::vector<std::string> names;
-  for (const char* name : {"R", "G", "B", "Y", "A"})
-    if (channels.findChannel(name)) names.emplace_back(name);
-  const bool colours = names.size() >= 3 && names[2] == "B" && (names.size() == 3 || names[3] == "A");
-  const bool grey = !names.empty() && names[0] == "Y" && (names.size() == 1 || names[1] == "A");
-  size_t n_channels = 0;
-  const Imf::PixelType type = channels.begin() == channels.end() ? Imf::UINT : channels.begin().channel().type;
-  for (auto c = channels.begin(); c != channels.end(); ++c, ++n_channels) {
-    const Imf::Channel& channel = c.channel();
-    if (channel.type != type || channel.xSampling != 1 || channel.ySampling != 1) return {};
-  }
-  return (colours || grey) && n_channels == names.size() && type != Imf::UINT ? names : std::vector<std::string>{};
-}
-
 bool has_plain_size(const Imath::Box2i& window) {
   const auto fits = [](int64_t low, int64_t high) { return high >= low && high - low < kMaxSize; };
   return fits(window.min.x, window.max.x) && fits(window.min.y, window.max.y);
 }
 
-class PlainExr final : public ImageReader {
+std::vector<ExrPart> parts_of(const Imf::MultiPartInputFile& file) {
+  std::vector<ExrPart> parts;
+  for (int i = 0; i < file.parts(); ++i) {
+    const Imf::Header& header = file.header(i);
+    ExrPart part{header.hasName() ? header.name() : "", {}, header.hasType() && Imf::isDeepData(header.type())};
+    for (auto c = header.channels().begin(); c != header.channels().end(); ++c)
+      part.channels.push_back({c.name(), c.channel().xSampling != 1 || c.channel().ySampling != 1});
+    parts.push_back(std::move(part));
+  }
+  return parts;
+}
+
+const char* type_name(Imf::PixelType type) {
+  return type == Imf::HALF ? "half" : (type == Imf::UINT ? "uint" : "float");
+}
+
+class ExrReader final : public ImageReader {
  public:
-  /// `file` passed the checks of open_plain_exr().
-  PlainExr(const std::string& path, std::unique_ptr<Imf::InputFile> file, std::vector<std::string> channels)
-      : file_(std::move(file)) {
-    const Imf::Header& header = file_->header();
+  ExrReader(const std::string& path, std::unique_ptr<Imf::MultiPartInputFile> file, const ExrPicture& picture)
+      : file_(std::move(file)), part_(picture.part) {
+    const Imf::Header& header = file_->header(part_);
     const Imath::Box2i &data = header.dataWindow(), &frame = header.displayWindow();
     path_ = path;
     has_rows_ = true;
@@ -63,10 +62,15 @@ class PlainExr final : public ImageReader {
     header_.width = data.max.x - data.min.x + 1, header_.height = data.max.y - data.min.y + 1;
     header_.x = data.min.x - frame.min.x, header_.y = data.min.y - frame.min.y;
     header_.frame_width = frame.max.x - frame.min.x + 1, header_.frame_height = frame.max.y - frame.min.y + 1;
-    header_.type = header.channels().begin().channel().type == Imf::HALF ? "half" : "float";
-    header_.floating_point = true;
-    if (channels.back() == "A") header_.alpha_channel = static_cast<int>(channels.size()) - 1;
-    header_.channels = std::move(channels);
+    header_.type = type_name(header.channels().findChannel(picture.channels[0])->type);
+    header_.floating_point = true;  // linear, integers too
+    header_.channels = picture.channels;
+    header_.n_picture = static_cast<int>(picture.channels.size());
+    for (auto c = header.channels().begin(); c != header.channels().end(); ++c) {
+      if (std::ranges::find(picture.channels, c.name()) == picture.channels.end())
+        header_.channels.emplace_back(c.name());
+      if (header_.channels.back() == "A") header_.alpha_channel = static_cast<int>(header_.channels.size()) - 1;
+    }
     for (auto a = header.begin(); a != header.end(); ++a)
       if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&a.attribute()))
         header_.attributes[a.name()] = text->value();
@@ -75,7 +79,8 @@ class PlainExr final : public ImageReader {
  private:
   bool read(const Part& part, float* values, std::string& problem) override {
     try {
-      Imath::Box2i window = file_->header().dataWindow();
+      Imf::InputPart input(*file_, part_);
+      Imath::Box2i window = input.header().dataWindow();
       window.min.y += part.first_row;
       window.max.y = window.min.y + part.n_rows - 1;
       const auto stride = sizeof(float) * static_cast<size_t>(part.last - part.first);
@@ -84,8 +89,8 @@ class PlainExr final : public ImageReader {
         buffer.insert(header_.channels[static_cast<size_t>(c)],
                       Imf::Slice::Make(Imf::FLOAT, values + (c - part.first), window, stride,
                                        stride * static_cast<size_t>(header_.width)));
-      file_->setFrameBuffer(buffer);
-      file_->readPixels(window.min.y, window.max.y);
+      input.setFrameBuffer(buffer);
+      input.readPixels(window.min.y, window.max.y);
       return true;
     } catch (const std::exception& error) {
       problem = error.what();
@@ -98,24 +103,26 @@ class PlainExr final : public ImageReader {
     return false;
   }
 
-  std::unique_ptr<Imf::InputFile> file_;
+  std::unique_ptr<Imf::MultiPartInputFile> file_;
+  int part_;
 };
 
 }  // namespace
 
-std::unique_ptr<ImageReader> open_plain_exr(const std::string& path) {
+std::unique_ptr<ImageReader> open_exr(const std::string& path) {
+  std::unique_ptr<Imf::MultiPartInputFile> file;
+  std::vector<ExrPart> parts;
   try {
-    bool tiled = false, deep = false, several_parts = false;
-    if (!Imf::isOpenExrFile(path.c_str(), tiled, deep, several_parts) || deep || several_parts) return nullptr;
-    auto file = std::make_unique<Imf::InputFile>(path.c_str(), 0);
-    const Imf::Header& header = file->header();
-    std::vector<std::string> channels = plain_channels(header.channels());
-    const bool plain =
-        !channels.empty() && has_plain_size(header.dataWindow()) && has_plain_size(header.displayWindow()) && !tiled;
-    return plain ? std::make_unique<PlainExr>(path, std::move(file), std::move(channels)) : nullptr;
+    file = std::make_unique<Imf::MultiPartInputFile>(path.c_str(), 0);
+    parts = parts_of(*file);
   } catch (const std::exception&) {
     return nullptr;
   }
+  if (std::ranges::all_of(parts, &ExrPart::deep)) return nullptr;
+  const ExrPicture picture = find_exr_picture(parts, path);
+  const Imf::Header& header = file->header(picture.part);
+  if (!has_plain_size(header.dataWindow()) || !has_plain_size(header.displayWindow())) return nullptr;
+  return std::make_unique<ExrReader>(path, std::move(file), picture);
 }
 
 namespace {

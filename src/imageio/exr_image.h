@@ -9,10 +9,11 @@
 
 namespace covary {
 
-/// Opens a single-part EXR file with channels R, G, B and optionally A, or Y and optionally A, all half or all float.
-/// Returns null for any other or damaged file, which is left to OpenImageIO. check_exr_header() must have accepted the
-/// file.
-std::unique_ptr<ImageReader> open_plain_exr(const std::string& path);
+/// Opens the picture of an EXR file (exr_picture.h), whose channels come first in the header, as ImageHeader::n_picture
+/// says. Integers are not scaled: they are values, as everywhere in EXR. Throws Error(kInput) if it is not clear which
+/// channels are the picture. Returns null for deep pixels and for damaged or huge files, which are left to OpenImageIO.
+/// check_exr_header() must have accepted the file.
+std::unique_ptr<ImageReader> open_exr(const std::string& path);
 
 // Checks the header of an EXR file before OpenEXR reads it: OpenEXR allocates whatever the header's attributes claim,
 // regardless of the file's size.

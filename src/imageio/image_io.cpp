@@ -137,7 +137,7 @@ std::unique_ptr<ImageReader> open_image(const std::string& path, OtherColours co
   std::unique_ptr<ImageReader> reader;
   if (is_exr(path)) {
     check_exr_header(path);
-    reader = open_plain_exr(path);
+    reader = open_exr(path);
   } else if (colours == OtherColours::kKeep || !find_image_module().module) {
     reader = open_plain_image(path);
   }

@@ -21,9 +21,10 @@ struct ImageHeader {
   int x = 0, y = 0;           ///< their top left corner, relative to the frame (display window)
   int frame_width = 0, frame_height = 0;
   std::string type;             ///< of one value: "uint8", "uint16", "half", "float", …
-  bool floating_point = false;  ///< half or float, and linear; otherwise sRGB-encoded integers
+  bool floating_point = false;  ///< linear: half, float, or integers of EXR; otherwise sRGB-encoded integers
   std::vector<std::string> channels;
   int alpha_channel = -1;                         ///< index into `channels`; -1: none
+  int n_picture = 0;                              ///< the first so many channels are the picture (EXR); 0: unknown
   std::map<std::string, std::string> attributes;  ///< those whose values are text
 };
 
@@ -35,7 +36,8 @@ class ImageReader {
   const ImageHeader& header() const { return header_; }
   size_t n_pixels() const { return static_cast<size_t>(header_.width) * static_cast<size_t>(header_.height); }
 
-  /// Channels [first, last) of all pixels, interleaved, row by row from the top; integers are scaled to [0, 1]. Colours
+  /// Channels [first, last) of all pixels, interleaved, row by row from the top; integers are scaled to [0, 1], but
+  /// for EXR. Colours
   /// are as stored, not premultiplied by alpha. Throws Error(kInput) if the file is damaged.
   std::vector<float> read_floats(int first, int last) { return read_floats(first, last, 0, header_.height); }
   /// The same as bytes; only for files of type "uint8".

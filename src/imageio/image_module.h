@@ -22,7 +22,7 @@ class ImageModule {
 
 /// Name of the module's only function, which returns a `const ImageModule*` valid for the life of the program. Increase
 /// the number whenever the classes in these headers change, so that a program never uses a module of another build.
-inline constexpr const char* kImageModuleEntry = "covary_image_module_2";
+inline constexpr const char* kImageModuleEntry = "covary_image_module_3";
 inline constexpr const char* kImageModuleFile = "libcovary_imageio.so";
 
 }  // namespace covary

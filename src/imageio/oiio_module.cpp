@@ -155,7 +155,7 @@ class OiioModule final : public ImageModule {
 }  // namespace
 }  // namespace covary
 
-extern "C" __attribute__((visibility("default"))) const covary::ImageModule* covary_image_module_2() {
+extern "C" __attribute__((visibility("default"))) const covary::ImageModule* covary_image_module_3() {
   static const covary::OiioModule module;
   return &module;
 }

@@ -24,6 +24,8 @@ namespace {
 
 /// Indices of the channels that hold grey or red, green, blue.
 std::vector<int> choose_channels(const ImageHeader& header, const std::string& path) {
+  if (header.n_picture == 1) return {0};
+  if (header.n_picture == 3) return {0, 1, 2};
   const std::vector<std::string>& names = header.channels;
   const auto find = [&](const char* name) {
     const auto it = std::find_if(names.begin(), names.end(),

@@ -14,15 +14,16 @@ struct TexelImage {
   int width = 0, height = 0;
   int channels = 0;            ///< 1 (grey) or 3 (RGB)
   std::vector<uint8_t> bytes;  ///< of files with 8 bits per channel, as stored
-  std::vector<float> floats;   ///< of all other files, integers scaled to [0, 1]
+  std::vector<float> floats;   ///< of all other files, integers scaled to [0, 1] except in EXR
   bool srgb = false;           ///< values are sRGB-encoded (integer formats); floating point is linear
 
   size_t n_pixels() const { return static_cast<size_t>(width) * height; }
 };
 
-/// Reads the first image of a file in any format that OpenImageIO supports (PNG, JPEG, EXR, HDR, PFM, TGA, BMP, PPM,
-/// TIFF). Throws like open_image() (imageio/image_io.h), and Error(kInput) if the file is damaged, has neither red,
-/// green and blue nor grey channels, or holds a value that is not finite.
+/// Reads the first image of a file in any format that OpenImageIO supports (PNG, JPEG, HDR, PFM, TGA, BMP, PPM, TIFF),
+/// or the picture of an EXR file (imageio/exr_picture.h). Throws like open_image() (imageio/image_io.h), and
+/// Error(kInput) if the file is damaged, has neither red, green and blue nor grey channels, or holds a value that is not
+/// finite.
 TexelImage read_texels(const std::string& path);
 
 /// pbrt's grey values of an image: alpha, if the image has colours and an alpha that is not 1 everywhere, otherwise the

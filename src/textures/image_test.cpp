@@ -149,6 +149,30 @@ TEST(Image, FindsColoursAmongOtherChannels) {
   }
 }
 
+/// Mitsuba 3.9.1 reads such a texture of ones as ones, too.
+TEST(Image, TakesIntegersOfExrAsTheyAre) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("integers.exr");
+  const auto output = OIIO::ImageOutput::create(path);
+  OIIO::ImageSpec spec(2, 1, 3, OIIO::TypeDesc::UINT32);
+  ASSERT_TRUE(output && output->open(path, spec));
+  const std::vector<uint32_t> values = {0, 1, 2, 3, 70000, 1u << 31};
+  ASSERT_TRUE(output->write_image(OIIO::TypeDesc::UINT32, values.data()) && output->close());
+  const TexelImage texture = read_texels(path), environment = read_linear_rgb(path);
+  EXPECT_FALSE(texture.srgb);
+  EXPECT_EQ(texture.floats, std::vector<float>(values.begin(), values.end()));
+  EXPECT_EQ(environment.floats, texture.floats);
+}
+
+TEST(Image, TakesALayerIfItIsTheOnlyPicture) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("layers.exr");
+  write_noise(path, 4, 4, {"depth.Z", "glow.R", "glow.G", "glow.B"});
+  EXPECT_EQ(read_texels(path).channels, 3);
+  write_noise(path, 4, 4, {"a.R", "a.G", "a.B", "b.R", "b.G", "b.B"});
+  EXPECT_NE(error_of(path).find(": 2 pictures; a texture needs one"), std::string::npos) << error_of(path);
+}
+
 TEST(Image, RejectsValuesThatAreNotFinite) {
   const TemporaryFolder folder;
   const std::string path = folder.file("bad.pfm");
