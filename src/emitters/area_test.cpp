@@ -117,7 +117,9 @@ TEST(AreaLight, ShinesOnTheSideOfTheVertexNormals) {
     AreaLight light(constant());
     light.attach(&mesh);
     ASSERT_EQ(light.parallelogram() != nullptr, with_uvs);
-    if (with_uvs) EXPECT_EQ(light.parallelogram()->surface.n.z, -1);
+    if (with_uvs) {
+      EXPECT_EQ(light.parallelogram()->surface.n.z, -1);
+    }
 
     SurfaceHit hit;
     hit.shape = &mesh, hit.barycentric = {0.25f, 0.5f};

@@ -4,6 +4,7 @@
 
 #include <OpenEXR/ImfArray.h>
 #include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfCompression.h>
 #include <OpenEXR/ImfDeepScanLineOutputFile.h>
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
@@ -90,6 +91,7 @@ TEST(ExrImage, LeavesOthersToOpenImageIo) {
   const std::string deep = folder.file("deep.exr");
   Imf::Header header(kFrame, kData);
   header.setType(Imf::DEEPSCANLINE);
+  header.compression() = Imf::ZIPS_COMPRESSION;
   header.channels().insert("Z", Imf::Channel(Imf::FLOAT));
   Imf::DeepScanLineOutputFile(deep.c_str(), header);
   EXPECT_FALSE(open_exr(deep));

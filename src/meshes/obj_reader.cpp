@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "meshes/mesh_file.h"
+#include "meshes/polygon.h"
 
 namespace covary {
 namespace {
@@ -132,12 +133,12 @@ class ObjReader {
   };
 
   void read_face(Line& line) {
-    uint32_t first = 0, previous = 0;
-    for (int k = 0; !line.at_end(); ++k) {
-      const uint32_t vertex = read_corner(line);
-      if (k == 0) first = vertex;
-      if (k >= 2) file_.mesh.triangles.push_back({first, previous, vertex});
-      previous = vertex;
+    corners_.clear();
+    while (!line.at_end()) corners_.push_back(read_corner(line));
+    try {
+      add_polygon(corners_, file_.mesh.positions, file_.mesh.triangles);
+    } catch (const Error& error) {
+      line.fail(error.what());
     }
   }
 
@@ -166,7 +167,8 @@ class ObjReader {
 
   std::vector<Vec3> positions_, normals_;
   std::vector<Vec2> uvs_;
-  std::vector<uint32_t> chains_;  // per position: its last vertex
+  std::vector<uint32_t> chains_;   // per position: its last vertex
+  std::vector<uint32_t> corners_;  // of one face
   std::vector<Vertex> vertices_;
   bool any_uv_ = false, any_normal_ = false;
   MeshFile file_;

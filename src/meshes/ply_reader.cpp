@@ -15,6 +15,7 @@
 #include "meshes/mesh_file.h"
 #include "meshes/ply_attributes.h"
 #include "meshes/ply_header.h"
+#include "meshes/ply_polygons.h"
 
 namespace covary {
 namespace {
@@ -251,7 +252,7 @@ void read_vertices(Body& body, const PlyElement& element, const Contents& conten
 }
 
 /// Reads faces "uchar n, int index[n]" without other properties. False: another layout.
-bool read_plain_faces(BinaryBody& body, const PlyElement& element, MeshData& mesh) {
+bool read_plain_faces(BinaryBody& body, const PlyElement& element, MeshData& mesh, PlyPolygons& polygons) {
   if (body.swap() || element.properties.size() != 1) return false;
   const PlyProperty& list = element.properties[0];
   if (list.count_type != PlyType::kUint8 || (list.type != PlyType::kInt32 && list.type != PlyType::kUint32))
@@ -267,7 +268,7 @@ bool read_plain_faces(BinaryBody& body, const PlyElement& element, MeshData& mes
       continue;
     }
     std::memcpy(corners.data(), indices, n * sizeof(uint32_t));
-    for (size_t k = 2; k < n; ++k) mesh.triangles.push_back({corners[0], corners[k - 1], corners[k]});
+    polygons.add({corners.data(), n}, i);
   }
   return true;
 }
@@ -283,7 +284,7 @@ void add_face_values(MeshData& mesh, const std::vector<std::array<float, 3>>& va
 }
 
 template <typename Body>
-void read_faces(Body& body, const PlyElement& element, MeshData& mesh) {
+void read_faces(Body& body, const PlyElement& element, MeshData& mesh, PlyPolygons& polygons) {
   const auto is_indices = [](const PlyProperty& p) {
     return p.is_list && (p.name == "vertex_indices" || p.name == "vertex_index") && p.type < PlyType::kFloat32;
   };
@@ -291,9 +292,10 @@ void read_faces(Body& body, const PlyElement& element, MeshData& mesh) {
     fail_ply("the faces have no integer list 'vertex_indices' or 'vertex_index'");
   mesh.triangles.reserve(element.count);
   if constexpr (std::is_same_v<Body, BinaryBody>)
-    if (read_plain_faces(body, element, mesh)) return;
+    if (read_plain_faces(body, element, mesh, polygons)) return;
   constexpr double kMaxIndex = std::numeric_limits<uint32_t>::max();
   std::vector<std::array<float, 3>> of_face(mesh.attributes.size());
+  std::vector<uint32_t> corners;
   for (uint64_t i = 0; i < element.count; ++i) {
     const size_t n_before = mesh.triangles.size();
     for (const PlyProperty& p : element.properties) {
@@ -304,15 +306,13 @@ void read_faces(Body& body, const PlyElement& element, MeshData& mesh) {
         skip_list(body, p, element, i);
       } else {
         const uint64_t n = read_length(body, p, element, i);
-        uint32_t first = 0, previous = 0;
+        corners.clear();
         for (uint64_t k = 0; k < n; ++k) {
           const double value = read_value(body, p.type, element, i);
           if (!(value >= 0 && value < kMaxIndex)) fail_ply(fmt::format("face {} uses vertex {}", i, value));
-          const uint32_t index = static_cast<uint32_t>(value);
-          if (k == 0) first = index;
-          if (k >= 2) mesh.triangles.push_back({first, previous, index});
-          previous = index;
+          corners.push_back(static_cast<uint32_t>(value));
         }
+        polygons.add(corners, i);
       }
     }
     add_face_values(mesh, of_face, mesh.triangles.size() - n_before);
@@ -321,6 +321,7 @@ void read_faces(Body& body, const PlyElement& element, MeshData& mesh) {
 
 template <typename Body>
 void read_body(Body body, PlyHeader& header, std::span<const std::string> attributes, MeshData& mesh) {
+  PlyPolygons polygons(mesh);
   for (PlyElement& element : header.elements) {
     const bool is_vertex = element.name == "vertex", is_face = element.name == "face";
     if (element.properties.empty() && !is_vertex && !is_face) continue;
@@ -332,7 +333,7 @@ void read_body(Body body, PlyHeader& header, std::span<const std::string> attrib
       const Contents contents = assign_slots(element);
       read_vertices(body, element, contents, mesh);
     } else if (is_face) {
-      read_faces(body, element, mesh);
+      read_faces(body, element, mesh, polygons);
     } else {
       for (uint64_t i = 0; i < element.count; ++i)
         for (const PlyProperty& p : element.properties) {
@@ -344,6 +345,7 @@ void read_body(Body body, PlyHeader& header, std::span<const std::string> attrib
         }
     }
   }
+  polygons.finish();
 }
 
 }  // namespace
