@@ -66,10 +66,12 @@ class ExrReader final : public ImageReader {
     header_.floating_point = true;  // linear, integers too
     header_.channels = picture.channels;
     header_.n_picture = static_cast<int>(picture.channels.size());
+    const std::string& first = picture.channels[0];
+    const std::string alpha = first.substr(0, first.rfind('.') + 1) + "A";  // of the same layer
     for (auto c = header.channels().begin(); c != header.channels().end(); ++c) {
       if (std::ranges::find(picture.channels, c.name()) == picture.channels.end())
         header_.channels.emplace_back(c.name());
-      if (header_.channels.back() == "A") header_.alpha_channel = static_cast<int>(header_.channels.size()) - 1;
+      if (header_.channels.back() == alpha) header_.alpha_channel = static_cast<int>(header_.channels.size()) - 1;
     }
     for (auto a = header.begin(); a != header.end(); ++a)
       if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&a.attribute()))

@@ -83,6 +83,11 @@ TEST(ExrImage, PutsThePictureFirst) {
   const std::vector<float> values = reader->read_floats(0, 5);  // channels 4, 2, 1, 0, 3 of write()
   EXPECT_EQ(std::vector(values.begin(), values.begin() + 5),
             (std::vector<float>{400.25f, 200.25f, 100.25f, 0.25f, 300.25f}));
+  write(path, {"A", "glow.A", "glow.B", "glow.G", "glow.R"});
+  const auto other = open_image(path);
+  const ImageHeader& layer = other->header();
+  EXPECT_EQ(layer.channels, (std::vector<std::string>{"glow.R", "glow.G", "glow.B", "A", "glow.A"}));
+  EXPECT_EQ(layer.alpha_channel, 4);
 }
 
 TEST(ExrImage, LeavesOthersToOpenImageIo) {
