@@ -103,8 +103,8 @@ AreaSample inside_sphere(
   return {Vec3{1, 0, 0} + d * 3, -d, uv, 1 / (2 * kPi * kPi * 9 * sine)};
 }
 
-/// A square seen counter-clockwise from +z, with vertex normals towards -z: its front is where Mitsuba and pbrt have it,
-/// at z < 0, however light is sampled. As one parallelogram, and as two triangles.
+/// A square seen counter-clockwise from +z, with vertex normals towards -z: its front is at z < 0, where Mitsuba and
+/// pbrt have it, however light is sampled. As one parallelogram, and as two triangles.
 TEST(AreaLight, ShinesOnTheSideOfTheVertexNormals) {
   for (const bool with_uvs : {true, false}) {
     MeshData data;

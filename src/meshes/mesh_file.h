@@ -31,8 +31,8 @@ struct MeshFile {
 /// blue".
 MeshFile read_ply(std::span<const std::byte> bytes, std::span<const std::string> attributes = {});
 
-/// Wavefront OBJ: v, vt, vn, f (polygons as in PLY; negative indices count from the end); other statements are skipped. All groups and
-/// objects in the file become one mesh.
+/// Wavefront OBJ: v, vt, vn, f (polygons as in PLY; negative indices count from the end); other statements are skipped.
+/// All groups and objects in the file become one mesh.
 MeshFile read_obj(std::string_view text);
 
 /// Mitsuba 0.x ".serialized", format versions 3 and 4: reads mesh `shape_index` of the file.

@@ -18,7 +18,7 @@ inline constexpr size_t kMostConcaveCorners = size_t{1} << 16;
 /// corners, which are indices into `positions`. The triangles are a fan around the first corner if none of them turns
 /// over, as in every convex polygon; otherwise ears are clipped [Meisters1975], seen along the axis closest to the
 /// normal. A polygon without a normal, or with a corner that does not exist, becomes a fan; one that crosses itself
-/// becomes triangles that cover its corners. Throws Error(kInput) for concave polygons of more than kMostConcaveCorners.
+/// becomes triangles that cover its corners. Throws Error(kInput) for concave ones of more than kMostConcaveCorners.
 void add_polygon(std::span<const uint32_t> corners, std::span<const Vec3> positions,
                  std::vector<std::array<uint32_t, 3>>& triangles);
 

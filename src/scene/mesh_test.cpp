@@ -100,8 +100,8 @@ TEST(TriangleMesh, SamplesProportionallyToArea) {
   EXPECT_EQ(left, 600);  // areas 1 and 1.5
 }
 
-/// Two triangles seen counter-clockwise from +z, the second with vertex normals towards -z, and one with normals on both
-/// sides: every sample lies on the side of the normal that a hit there has, as in Mitsuba 3 (mesh.cpp) and pbrt-v4
+/// Two triangles seen counter-clockwise from +z, the second with vertex normals towards -z, and one with normals on
+/// both sides: every sample lies on the side of the normal that a hit there has, as in Mitsuba 3 (mesh.cpp) and pbrt-v4
 /// (FaceForward in triangle interactions).
 TEST(TriangleMesh, SamplesTheSideOfTheVertexNormals) {
   MeshData data;

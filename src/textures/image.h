@@ -22,8 +22,8 @@ struct TexelImage {
 
 /// Reads the first image of a file in any format that OpenImageIO supports (PNG, JPEG, HDR, PFM, TGA, BMP, PPM, TIFF),
 /// or the picture of an EXR file (imageio/exr_picture.h). Throws like open_image() (imageio/image_io.h), and
-/// Error(kInput) if the file is damaged, has neither red, green and blue nor grey channels, or holds a value that is not
-/// finite.
+/// Error(kInput) if the file is damaged, has neither red, green and blue nor grey channels, or holds a value that is
+/// not finite.
 TexelImage read_texels(const std::string& path);
 
 /// pbrt's grey values of an image: alpha, if the image has colours and an alpha that is not 1 everywhere, otherwise the
