@@ -32,6 +32,7 @@
 #include "frame_files.h"
 #include "guide_layer.h"
 #include "json_output.h"
+#include "metrics/provenance.h"
 #include "numbers.h"
 #include "progress.h"
 #include "risk_report.h"
@@ -47,7 +48,7 @@ struct CombineOptions : CombineSettings {
   OptionValues values, of_estimator;
   FrameOptions of_frames;
   std::string stages, json;
-  bool quiet = false;
+  bool quiet = false, overwrite = false;
   int threads = 0;
 };
 
@@ -55,14 +56,17 @@ Estimator estimator_of(const CombineOptions& o) {
   return with_denoising(make_estimator(o.estimator, o.of_estimator), o.denoising);
 }
 
-void write(const CombineOptions& o, const CombineRequest& request, CombinedImage& combined) {
-  std::map<std::string, std::string> attributes = {{"covary:estimator", estimator_of(o).text},
-                                                   {"covary:version", COVARY_VERSION},
-                                                   {"covary:command", command_line()}};
+std::vector<std::string> write(const CombineOptions& o, const CombineRequest& request, const ResultSource& source,
+                               CombinedImage& combined) {
+  std::map<std::string, std::string> attributes = inherited_attributes(o.independent);
+  for (const char* of_pass : {"covary:sampling", "covary:samples"}) attributes.erase(of_pass);
+  attributes["covary:estimator"] = estimator_of(o).text;
+  attributes["covary:version"] = COVARY_VERSION;
+  attributes["covary:command"] = command_line();
   const double crn = request.crn ? request.crn->samples : 0, independent = request.independent.samples;
   if ((crn > 0 || !request.crn) && independent > 0) attributes["covary:samples"] = fmt::to_string(crn + independent);
   if (!o.error) combined.image.std_error = {}, combined.image.bias = {};  // were needed for --json only
-  write_result(o.output, request.independent.origin.place, attributes, combined.image, combined.layers);
+  return write_result(o.output, request.independent.origin.place, attributes, combined.image, combined.layers, source);
 }
 
 void check_explain(const CombineOptions& o, const Estimator& estimator, const GroupedFile& file) {
@@ -186,7 +190,7 @@ void check_files_of_command(const CombineOptions& o) {
   outputs.reads(o.independent);
   for (const std::string& path : {o.light, o.counts, o.guides})
     if (!path.empty()) outputs.reads(path);
-  outputs.writes("-o", o.output, OutputKind::kFilm);
+  outputs.writes_result("-o", o.output, OutputKind::kFilm, "combine", o.overwrite);
   outputs.writes("--json", o.json, OutputKind::kText);
 }
 
@@ -310,10 +314,11 @@ void combine_files(const CombineOptions& o) {
   CombinedImage combined = combine(request);
   Stopwatch watch;
   progress.begin("writing");
-  write(o, request, combined);
+  const std::vector<std::string> lost = write(o, request, inputs.independent.source(), combined);
   write_stages(o, request);
   const double write_seconds = watch.lap();
   progress.finish();
+  for (const std::string& what : lost) fmt::print(stderr, "warning: {}\n", what);
 
   nlohmann::ordered_json json = statistics(o, request, combined, write_seconds);
   if (o.explain) {
@@ -378,6 +383,7 @@ void add_combine(CLI::App& app) {
   add_options(*command, of_estimator, o->of_estimator);
   add_stages_option(*command, o->stages);
   add_threads_option(*command, o->threads);
+  add_overwrite_option(*command, o->overwrite);
   add_value(*command, "--json", o->json, kFileValue, "File for statistics; '-': standard output");
   command->add_flag("--quiet", o->quiet, "Warnings and errors only");
   add_frame_options(*command, o->of_frames, "With --denoise, combine");

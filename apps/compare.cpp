@@ -58,6 +58,7 @@ std::vector<Image> denominators_of(const CompareOptions& options, std::vector<Im
   const auto pixels = [&](ImageRows& file) { return cut({file.place(), file.read_all()}, window); };
   if (!options.denominator.empty()) {
     ImageRows file(options.denominator, options.layer);
+    file.convert_to(references[0].colours());
     if (!(common_window(path, place, window, options.denominator, file.place()) == window))
       throw Error(ErrorCode::kInput,
                   fmt::format("--denominator '{}' does not cover {}", options.denominator, text_of(window)));
@@ -80,13 +81,18 @@ Comparison compare_one(const CompareOptions& options, std::vector<ImageRows>& re
   }
   std::vector<ImageRows*> files{&image};
   for (ImageRows& reference : references) files.push_back(&reference);
-  ComparedFiles rows(files, comparison.window);
-  require_memory_to_compare(options, path, rows, files.size());
+  require_memory_to_compare(options, path, ComparedFiles(files, comparison.window), files.size());
+  for (ImageRows* file : files) file->convert_to(references[0].colours());
   const std::vector<Image> denominators = denominators_of(options, references, path, image.place(), comparison.window);
-  rows.set_denominators(denominators);
   for (const std::string& name : options.metrics) {
     const bool with_map = comparison.results.empty() && !options.error_map.empty();
+    // Relative errors are those of the reference's colours; FLIP is about what a display shows.
+    const bool is_shown = find_metric(name).metric == Metric::kFlip;
+    const ColourSpace colours = is_shown ? ColourSpace::rec709() : references[0].colours();
     try {
+      for (ImageRows* file : files) file->convert_to(colours);
+      ComparedFiles rows(files, comparison.window);
+      rows.set_denominators(denominators);
       comparison.results.push_back(compute_metric(find_metric(name).metric, rows, low_dynamic_range, with_map));
     } catch (const Error& error) {
       const std::string text = error.what();

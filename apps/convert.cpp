@@ -4,17 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
+#include <iterator>
 #include <memory>
 #include <numeric>
 #include <optional>
 #include <vector>
 
+#include "combine/result_file.h"
 #include "commands.h"
 #include "core/error.h"
 #include "declared_options.h"
+#include "film/exr_copy.h"
 #include "film/image_writer.h"
-#include "film/output_file.h"
 #include "film/outputs.h"
 #include "metrics/error_map.h"
 #include "metrics/provenance.h"
@@ -25,6 +26,8 @@
 
 namespace covary {
 namespace {
+
+constexpr const char* kOutput = "the output";  // in messages
 
 struct ConvertOptions {
   std::vector<std::string> files;  // the last is the output
@@ -48,28 +51,74 @@ Image in_false_colours(const Image& image, const std::string& output) {
   return colour_errors(mean, scale);
 }
 
-/// The images side by side, top-aligned, with black below shorter ones.
-Image side_by_side(const std::vector<Image>& images) {
+/// A picture multiplied by its alpha, if it has any.
+struct Picture {
+  PlacedImage colours;
+  Image alpha;
+};
+
+Picture read_picture(const ConvertOptions& options, const std::string& path) {
+  Picture picture{read_image(path, options.layer, options.checksums()), {}};
+  if (options.colours) return picture;
+  Alpha alpha = read_alpha(path, options.layer, options.checksums());
+  for (size_t i = 0; alpha.straight && i < alpha.values.data.size(); ++i)
+    for (size_t c = 0; c < 3; ++c) picture.colours.image.data[3 * i + c] *= alpha.values.data[i];
+  picture.alpha = std::move(alpha.values);
+  return picture;
+}
+
+/// The images side by side, top-aligned, with 0 below shorter ones.
+Image side_by_side(const std::vector<const Image*>& images) {
   int width = 0, height = 0;
-  for (const Image& image : images) {
-    width += image.width;
-    height = std::max(height, image.height);
+  for (const Image* image : images) {
+    width += image->width;
+    height = std::max(height, image->height);
   }
-  Image result(width, height, 3);
+  Image result(width, height, images[0]->channels);
   int left = 0;
-  for (const Image& image : images) {
-    for (int y = 0; y < image.height; ++y)
-      std::copy_n(image.pixel(0, y), image.width * image.channels, result.pixel(left, y));
-    left += image.width;
+  for (const Image* image : images) {
+    for (int y = 0; y < image->height; ++y)
+      std::copy_n(image->pixel(0, y), image->width * image->channels, result.pixel(left, y));
+    left += image->width;
   }
   return result;
 }
 
-/// Attributes of the new image: none are inherited from several images; covary's are dropped if the image was changed.
-std::map<std::string, std::string> attributes_of(const ConvertOptions& options) {
+/// The frames of the pictures side by side, opaque without alpha; the picture itself if there is only one.
+Picture joined(std::vector<Picture> pictures) {
+  if (pictures.size() == 1) return std::move(pictures[0]);
+  const bool has_alpha =
+      std::any_of(pictures.begin(), pictures.end(), [](const Picture& p) { return !p.alpha.data.empty(); });
+  std::vector<const Image*> colours, alphas;
+  for (Picture& picture : pictures) {
+    picture.colours.image = framed(picture.colours.image, picture.colours.place);
+    const Image& image = picture.colours.image;
+    colours.push_back(&image);
+    if (!has_alpha) continue;
+    if (picture.alpha.data.empty())
+      picture.alpha = Image(image.width, image.height, 1), std::ranges::fill(picture.alpha.data, 1.0f);
+    else
+      picture.alpha = framed(picture.alpha, picture.colours.place);
+    alphas.push_back(&picture.alpha);
+  }
+  Picture all;
+  Image& image = all.colours.image = side_by_side(colours);
+  if (has_alpha) all.alpha = side_by_side(alphas);
+  all.colours.place = {image.width, image.height, {0, 0, image.width, image.height}};
+  return all;
+}
+
+/// covary's attributes of the new image: none are inherited from several images, nor if another program changed it.
+std::map<std::string, std::string> attributes_of(const ConvertOptions& options, bool is_same_picture) {
   std::map<std::string, std::string> attributes;
-  if (options.files.size() == 2 && !options.accept_changed)
-    attributes = inherited_attributes(inspect_image(options.files[0]).attributes);
+  if (options.files.size() == 2 && !options.accept_changed) {
+    const std::map<std::string, std::string> all = inspect_image(options.files[0]).attributes;
+    if (is_same_picture)
+      std::copy_if(all.begin(), all.end(), std::inserter(attributes, attributes.end()),
+                   [](const auto& a) { return a.first.starts_with("covary:") && a.first != kChecksums; });
+    else
+      attributes = inherited_attributes({&all, 1});
+  }
   const auto earlier = attributes.find(kExposureAttribute);
   const double exposure =
       options.exposure + (earlier == attributes.end() ? 0 : parse_real(earlier->second).value_or(0));
@@ -81,45 +130,54 @@ std::map<std::string, std::string> attributes_of(const ConvertOptions& options) 
   return attributes;
 }
 
-/// Whether the file, according to its metadata, can be made again: an EXR written by this command, or any PNG of
-/// covary.
-bool is_own_picture(const std::string& path) {
-  if (lower_extension(path) == ".png") return is_own_png(path);
-  if (lower_extension(path) != ".exr") return false;
-  try {
-    const std::map<std::string, std::string> attributes = inspect_image(path, ChecksumPolicy::kIgnore).attributes;
-    const auto command = attributes.find("covary:command");
-    return command != attributes.end() && command->second.starts_with("covary convert ");
-  } catch (const Error&) {
-    return false;  // damaged, or something else under this name
-  }
-}
-
-/// `convert *.exr` would make the last existing file the output.
-void check_not_lost(const ConvertOptions& options) {
-  const std::string& output = options.files.back();
-  std::error_code ignored;
-  if (options.overwrite || !std::filesystem::is_regular_file(output, ignored) || output_target(output).is_special ||
-      is_own_picture(output))
-    return;
-  throw Error(ErrorCode::kUsage,
-              fmt::format("the output '{}', which is the last name given, already exists and not a picture that "
-                          "'covary convert' made; give another name, or --overwrite to replace it",
-                          output));
-}
-
 /// Checks memory for the result: one image side by side if there are several, and a copy for writing.
-void check_memory(const std::vector<Image>& images, const std::string& output) {
-  constexpr double kPixel = 3 * sizeof(float);
+void check_memory(const ConvertOptions& options) {
+  constexpr double kPixel = 4 * sizeof(float);
+  const size_t n_inputs = options.files.size() - 1;
   int width = 0, height = 0;
-  for (const Image& image : images) width += image.width, height = std::max(height, image.height);
-  require_image_memory(output, width, height, (images.size() > 1 ? 2 : 1) * kPixel);
+  for (size_t i = 0; i < n_inputs; ++i) {
+    const ImagePlace place = inspect_image(options.files[i], options.checksums()).place;
+    width += std::max(place.window.width, place.frame_width);
+    height = std::max({height, place.window.height, place.frame_height});
+  }
+  require_image_memory(options.files.back(), width, height, (n_inputs > 1 ? 3 : 2) * kPixel);
 }
 
 void expose(const ConvertOptions& options, Image& image) {
   const float factor = static_cast<float>(std::exp2(options.exposure));
   for (float& value : image.data) value *= factor;
   if (options.colours) image = in_false_colours(image, options.files.back());
+}
+
+/// EXR to EXR: what does not change stays as it is. A layer becomes the picture of a file of its own.
+void convert_exr(const ConvertOptions& options) {
+  const std::string &input = options.files[0], &output = options.files[1];
+  const bool is_layer = !options.layer.empty(), is_same_picture = !is_layer && options.exposure == 0;
+  ExrChanges changes;
+  changes.attributes = attributes_of(options, is_same_picture);
+  PlacedImage image;
+  Alpha alpha;
+  if (!is_same_picture) {
+    check_memory(options);
+    const ExrFile file(input, options.checksums());
+    const std::vector<std::string> names = layer_channels(input, file.channels(), options.layer);
+    image = read_image(input, options.layer, options.checksums(), std::nullopt);
+    expose(options, image.image);
+    const bool is_grey = names[0] == names[2];
+    for (size_t c = 0; c < (is_grey && !is_layer ? 1 : 3); ++c)
+      changes.planes.push_back({is_layer ? std::string(1, "RGB"[c]) : names[c], ExrPlane::Type::kFloat,
+                                image.image.data.data() + c, 3 * sizeof(float)});
+    if (is_layer) alpha = read_alpha(input, options.layer, options.checksums());
+    if (!alpha.values.data.empty()) add_image_planes("A", alpha.values, changes.planes);
+    changes.picture = names[0];
+    changes.only_planes = is_layer;
+    changes.left_out = statistics_channels(file);
+    if (!is_layer && !changes.left_out.empty())
+      fmt::print(stderr, "warning: {}: errors and groups of samples are left out, since --exposure changes the image\n",
+                 output);
+  }
+  for (const std::string& what : write_changed_exr(output, input, changes, options.checksums()))
+    fmt::print(stderr, "warning: {}\n", what);
 }
 
 /// Converts numbered images, or several sequences side by side, to a video.
@@ -136,15 +194,17 @@ void convert_frames(const ConvertOptions& options) {
   if (frames.empty()) throw Error(ErrorCode::kInput, fmt::format("there are no frames '{}'", inputs[0]));
   Outputs outputs;
   for (const int frame : frames)
-    for (const std::string& input : inputs) outputs.reads(frame_name(input, frame));
-  outputs.writes("the output", output, OutputKind::kText);
-  check_not_lost(options);
+    for (const std::string& input : inputs) {
+      outputs.reads(frame_name(input, frame));
+      inspect_image(frame_name(input, frame), options.checksums());  // before any frame is spent
+    }
+  outputs.writes_result(kOutput, output, OutputKind::kText, "convert", options.overwrite);
   VideoWriter video(output, options.rate.value_or(kUsualRate));
   for (const int frame : frames) {
-    std::vector<Image> images;
-    for (const std::string& input : inputs)
-      images.push_back(read_image(frame_name(input, frame), options.layer, options.checksums()).image);
-    Image image = images.size() == 1 ? std::move(images[0]) : side_by_side(images);
+    std::vector<Picture> pictures;
+    for (const std::string& input : inputs) pictures.push_back(read_picture(options, frame_name(input, frame)));
+    const Picture picture = joined(std::move(pictures));
+    Image image = framed(picture.colours.image, picture.colours.place);
     expose(options, image);
     video.add(image);
   }
@@ -159,20 +219,15 @@ void convert(const ConvertOptions& options) {
   const std::string& output = options.files.back();
   Outputs outputs;
   outputs.reads(inputs);
-  outputs.writes("the output", output, OutputKind::kImage);
-  check_not_lost(options);
-  std::vector<Image> images;
-  ImagePlace place;
-  for (const std::string& input : inputs) {
-    PlacedImage image = read_image(input, options.layer, options.checksums());
-    place = image.place;
-    images.push_back(std::move(image.image));
-  }
-  check_memory(images, output);
-  Image image = images.size() == 1 ? std::move(images[0]) : side_by_side(images);
-  if (inputs.size() > 1) place = {image.width, image.height, {0, 0, image.width, image.height}};
-  expose(options, image);
-  write_image(output, image, place, attributes_of(options));
+  outputs.writes_result(kOutput, output, OutputKind::kImage, "convert", options.overwrite);
+  if (inputs.size() == 1 && lower_extension(output) == ".exr" && !options.colours && is_exr_image(inputs[0]))
+    return convert_exr(options);
+  check_memory(options);
+  std::vector<Picture> pictures;
+  for (const std::string& input : inputs) pictures.push_back(read_picture(options, input));
+  Picture picture = joined(std::move(pictures));
+  expose(options, picture.colours.image);
+  write_image(output, picture.colours.image, picture.colours.place, attributes_of(options, false), picture.alpha);
 }
 
 }  // namespace
@@ -197,7 +252,7 @@ void add_convert(CLI::App& app) {
                     "Show brightness in the colours of error maps, e.g. for --layer StdError; their scale is printed");
   command->add_flag("--accept-changed", o->accept_changed,
                     "Accept an image of covary that another program changed; the output records no origin");
-  command->add_flag("--overwrite", o->overwrite, "Replace any existing OUT, not only pictures made by convert");
+  add_overwrite_option(*command, o->overwrite);
   command->callback([o] { convert(*o); });
 }
 

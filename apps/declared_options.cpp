@@ -76,6 +76,10 @@ void add_options(CLI::App& command, const std::vector<Option>& options, OptionVa
   for (const Option& option : options) add_option(command, option, values);
 }
 
+void add_overwrite_option(CLI::App& command, bool& overwrite) {
+  command.add_flag("--overwrite", overwrite, "Replace the output even if another command or program made it");
+}
+
 void add_define_option(CLI::App& command, std::vector<std::string>& defines) {
   add_value(command, "-D,--define", defines, "name=value", "Value of one of the scene's <default> elements")
       ->take_all()

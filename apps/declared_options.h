@@ -22,6 +22,9 @@ CLI::Option* add_value(CLI::App& command, const std::string& names, T& value, co
   return command.add_option(names, value, help)->type_name(kind);
 }
 
+/// --overwrite, for Outputs::writes_result().
+void add_overwrite_option(CLI::App& command, bool& overwrite);
+
 // -D name=value on the command line: values for the scene's <default> elements.
 
 void add_define_option(CLI::App& command, std::vector<std::string>& defines);

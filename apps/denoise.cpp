@@ -44,7 +44,7 @@ struct Options {
   std::vector<std::string> inputs;
   std::string output, mode, oidn, albedo, normal;
   std::vector<std::string> layers;
-  bool no_guides = false, clean_guides = false, check = false, quiet = false, force = false;
+  bool no_guides = false, clean_guides = false, check = false, quiet = false, force = false, overwrite = false;
   FrameOptions of_frames;
   std::shared_ptr<const History> history;  ///< of the frame being denoised
 
@@ -120,13 +120,22 @@ class GuideLayers {
   float n_albedo_ = 0, n_normal_ = 0, n_position_ = 0;
 };
 
+/// Writes the result in place of the picture of the first input.
+void write(const Options& o, const ImagePlace& place, const std::map<std::string, std::string>& attributes,
+           EstimatorResult& result, std::map<std::string, Image> layers, const ResultSource& source,
+           ProgressLine& progress) {
+  const std::vector<std::string> lost = write_result(o.output, place, attributes, result, layers, source);
+  progress.finish();
+  for (const std::string& what : lost) fmt::print(stderr, "warning: {}\n", what);
+}
+
 void denoise_by_network(const Options& o, const GuideLayers& guides, ProgressLine& progress) {
   const Stopwatch watch;
   const std::string& input = o.inputs[0];
   const ImageInfo info = inspect_image(input);
   constexpr double kImages = 4 * 3 * sizeof(float), kNetworkBytes = 600;  // per pixel: image, guides and result
   require_image_memory(input, info.place.window.width, info.place.window.height, kImages + kNetworkBytes);
-  const PlacedImage image = read_image(input);
+  const PlacedImage image = read_image(input, "", ChecksumPolicy::kCheck, std::nullopt);
   warn_of_values(input, image.image);
   if (const std::string by = denoised_by(info.attributes, info.channels); !by.empty())
     fmt::print(stderr, "warning: {} is denoised already ({}); give the render before denoising\n", input, by);
@@ -138,17 +147,16 @@ void denoise_by_network(const Options& o, const GuideLayers& guides, ProgressLin
   Image result =
       denoiser.denoise(image.image, albedo ? &*albedo : nullptr, normal ? &*normal : nullptr, o.clean_guides);
   progress.begin("writing");
-  std::map<std::string, std::string> attributes = inherited_attributes(info.attributes);
+  std::map<std::string, std::string> attributes = inherited_attributes(o.inputs);
   attributes["covary:version"] = COVARY_VERSION;
   attributes["covary:command"] = command_line();
   attributes["covary:denoiser"] = "Open Image Denoise " + denoiser_info(o.denoiser()).version;
-  std::vector<ExrPlane> planes;
-  for (size_t c = 0; c < 3; ++c)
-    planes.push_back({std::string(1, "RGB"[c]), ExrPlane::Type::kFloat, result.data.data() + c, 12});
-  write_exr(o.output, image.place, attributes, planes);
-  progress.finish();
+  const std::vector<std::string> picture = layer_channels(input, info.channels, "");
+  EstimatorResult denoised;
+  denoised.estimate = std::move(result);
+  write(o, image.place, attributes, denoised, {}, {o.inputs, {picture[0], picture[1], picture[2]}, {}}, progress);
   if (!o.quiet)
-    fmt::print(stderr, "{}: {} x {}, {}, in {:.2f} s\n", o.output, result.width, result.height, guides.text(),
+    fmt::print(stderr, "{}: {} x {}, {}, in {:.2f} s\n", o.output, image.image.width, image.image.height, guides.text(),
                watch.seconds());
 }
 
@@ -170,14 +178,13 @@ void denoise_by_mixture(const Options& o, const GroupedFile& file, const GuideLa
   };
   CombinedImage combined = combine(request);
   progress.begin("writing");
-  std::map<std::string, std::string> attributes = inherited_attributes(inspect_image(o.inputs[0]).attributes);
+  std::map<std::string, std::string> attributes = inherited_attributes(o.inputs);
   attributes["covary:version"] = COVARY_VERSION;
   attributes["covary:command"] = command_line();
   attributes["covary:estimator"] = request.estimator.text;
   if (!request.estimator.network.empty()) attributes["covary:denoiser"] = request.estimator.network;
   if (file.samples() > 0) attributes["covary:samples"] = fmt::to_string(file.samples());
-  write_result(o.output, file.place(), attributes, combined.image, combined.layers);
-  progress.finish();
+  write(o, file.place(), attributes, combined.image, std::move(combined.layers), file.source(), progress);
   if (o.quiet) return;
   fmt::print(stderr, "{}: {} x {}, {} of {} groups, {}, in {:.2f} s\n", o.output, file.width(), file.height(),
              request.estimator.text, file.groups(), guides.text(), combined.check_seconds + combined.estimate_seconds);
@@ -207,7 +214,7 @@ void run_one(const Options& o) {
   check_options(o);
   Outputs outputs;
   outputs.reads(o.inputs);
-  outputs.writes("-o", o.output, OutputKind::kFilm);
+  outputs.writes_result("-o", o.output, OutputKind::kFilm, "denoise", o.overwrite);
   ProgressLine progress(std::filesystem::path(o.inputs[0]).stem().string(), o.quiet);
   progress.begin("loading");
   const GuideLayers guides(o);
@@ -272,6 +279,7 @@ void add_denoise(CLI::App& app) {
       "--clean-guides", o->clean_guides,
       "With --mode oidn, denoise the guides first: less error if they are noisy, in three times the time");
   add_frame_options(*command, o->of_frames, "Denoise");
+  add_overwrite_option(*command, o->overwrite);
   command->add_flag("--force", o->force, "Denoise even if the renders do not match");
   command->add_flag("--quiet", o->quiet, "No summary");
   command->callback([o] { run(*o); });

@@ -2,10 +2,12 @@
 #include "frame_files.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <set>
 #include <string_view>
 
 #include "combine/grouped_file.h"
@@ -21,6 +23,12 @@ namespace covary {
 namespace {
 
 [[noreturn]] void usage(const std::string& message) { throw Error(ErrorCode::kUsage, message); }
+
+/// A fault of the whole sequence, not of one frame.
+class WrongSequence : public Error {
+ public:
+  explicit WrongSequence(const std::string& message) : Error(ErrorCode::kInput, message) {}
+};
 
 /// If the motion does not match, the signs of another convention with which it does; nullopt if there are none.
 std::optional<std::array<float, 2>> better_signs(const Image& before, const Image& now, const MotionLayers& motion,
@@ -52,11 +60,11 @@ void check_motion(const std::string& before, const std::string& now, const std::
   if (fit <= 1 && !signs) return;
   const std::string instead =
       signs ? fmt::format("; multiplied by {},{} (--motion-scale) it fits better", (*signs)[0], (*signs)[1]) : "";
-  throw Error(ErrorCode::kInput,
-              fmt::format("'{}': its motion does not match '{}': after warping, the difference is {:.2f} times that "
-                          "without motion{}. Expected are pixels to the right and down, from a pixel to its point's "
-                          "position in the previous frame; see --motion-scale, or --no-history",
-                          now, before, fit, instead));
+  throw WrongSequence(
+      fmt::format("'{}': its motion does not match '{}': after warping, the difference is {:.2f} times that "
+                  "without motion{}. Expected are pixels to the right and down, from a pixel to its point's "
+                  "position in the previous frame; see --motion-scale, or --no-history",
+                  now, before, fit, instead));
 }
 
 /// Frames with the same seed share errors, which held-out samples cannot reveal.
@@ -68,9 +76,10 @@ void check_seeds(const std::string& before, const std::string& now) {
   };
   const std::string own = seed(now);
   if (!own.empty() && own == seed(before))
-    throw Error(ErrorCode::kInput, fmt::format("'{}' and '{}' have the same seed, {}; each frame needs its own seed, "
-                                               "or --no-history",
-                                               before, now, own));
+    throw WrongSequence(
+        fmt::format("'{}' and '{}' have the same seed, {}; each frame needs its own seed, "
+                    "or --no-history",
+                    before, now, own));
 }
 
 MotionSource motion_source(const FrameOptions& o) {
@@ -84,13 +93,66 @@ MotionSource motion_source(const FrameOptions& o) {
   return source;
 }
 
-/// The pattern of the files that contain motion; if none does, the first, whose channels the error then lists.
-std::string motion_pattern(const MotionSource& source, const FramePatterns& patterns, int frame) {
+/// The pattern of the files that contain motion; nullopt if none does, and the user did not name its layer.
+std::optional<std::string> motion_pattern(const MotionSource& source, const FramePatterns& patterns, int frame) {
   std::vector<std::string> all = patterns.images;
   all.insert(all.end(), patterns.others.begin(), patterns.others.end());
   for (const std::string& pattern : all)
     if (is_frame_pattern_of_input(pattern) && has_motion(frame_name(pattern, frame), source)) return pattern;
-  return patterns.images[0];
+  if (source.motion == MotionSource().motion) return std::nullopt;
+  return patterns.images[0];  // whose layers the error then lists
+}
+
+/// Frames that exist in any of the images, or those asked for.
+std::vector<int> frames_of_all(const FrameOptions& o, const FramePatterns& patterns) {
+  if (!o.frames.empty()) return frames_of(o.frames, patterns.images[0]);
+  std::set<int> frames;
+  for (const std::string& pattern : patterns.images)
+    for (const int frame : frames_of("", pattern)) frames.insert(frame);
+  return {frames.begin(), frames.end()};
+}
+
+/// What is wrong with the header of a frame; `first`: that of the sequence's first frame, if it was read.
+std::string problem_of(const std::string& path, std::optional<ImageInfo>& first) {
+  try {
+    ImageInfo info = inspect_image(path);
+    if (!first) {
+      first = std::move(info);
+      return "";
+    }
+    const CropWindow &here = info.place.window, &there = first->place.window;
+    if (!(info.place == first->place))
+      return fmt::format("'{}' has {} x {} pixels at ({}, {}), the first frame {} x {} at ({}, {})", path, here.width,
+                         here.height, here.x, here.y, there.width, there.height, there.x, there.y);
+    for (const auto& [a, b] : {std::pair{&*first, &info}, {&info, &*first}})
+      for (const ExrFile::Channel& channel : a->channels)
+        if (std::none_of(b->channels.begin(), b->channels.end(), [&](const auto& c) { return c.name == channel.name; }))
+          return fmt::format("'{}': the channel {} is {}", path, channel.name,
+                             b == &info ? "missing, which the first frame has" : "not in the first frame");
+    return "";
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+/// Reads the headers of all files before the first frame is spent. Throws Error(kInput) naming the first problems.
+void check_frames(const std::vector<int>& frames, const FramePatterns& patterns) {
+  constexpr size_t kMostNamed = 5;
+  std::vector<std::string> all = patterns.images, problems;
+  for (const std::string& other : patterns.others)
+    if (!other.empty() && is_frame_pattern_of_input(other)) all.push_back(other);
+  for (const std::string& pattern : all) {
+    std::optional<ImageInfo> first;
+    for (const int frame : frames)
+      if (std::string problem = problem_of(frame_name(pattern, frame), first); !problem.empty())
+        problems.push_back(std::move(problem));
+  }
+  if (problems.empty()) return;
+  const size_t more = problems.size() - std::min(problems.size(), kMostNamed);
+  problems.resize(problems.size() - more);
+  throw Error(ErrorCode::kInput,
+              fmt::format("{}{}; nothing was written", fmt::join(problems, "; "),
+                          more > 0 ? fmt::format("; and {} more problems of frames", more) : std::string()));
 }
 
 }  // namespace
@@ -139,22 +201,42 @@ void for_each_frame(const FrameOptions& o, const FramePatterns& patterns, bool h
                     const std::function<void(int frame, std::shared_ptr<const History> history)>& run) {
   const MotionSource source = motion_source(o);
   const std::string& images = patterns.images[0];
-  std::optional<int> last;
-  for (const int frame : frames_of(o.frames, images)) {
-    std::shared_ptr<const History> history;
-    if (has_history && !o.no_history && last == frame - 1) {
-      const std::string motion = motion_pattern(source, patterns, frame);
-      const std::string before = frame_name(images, *last), now = frame_name(images, frame);
-      const MotionLayers layers = read_motion(frame_name(motion, frame), source);
-      const MotionLayers old = read_motion(frame_name(motion, *last), source);
-      check_seeds(before, now);
-      check_motion(before, now, patterns.layer, layers);
-      history =
-          std::make_shared<History>(reproject(read_image(frame_name(patterns.output, *last)).image, old.depth, layers));
+  const std::vector<int> frames = frames_of_all(o, patterns);
+  check_frames(frames, patterns);
+  const bool wants_history = has_history && !o.no_history && frames.size() > 1;
+  const std::optional<std::string> motion = wants_history ? motion_pattern(source, patterns, frames[0]) : std::nullopt;
+  if (wants_history && !motion)
+    fmt::print(stderr, "note: the frames have no layer '{}' (--motion); each is treated alone, without history\n",
+               source.motion);
+  std::optional<int> last;  // the frame before, if it succeeded
+  std::vector<int> failed;
+  for (const int frame : frames) {
+    try {
+      std::shared_ptr<const History> history;
+      if (motion && last == frame - 1) {
+        const std::string before = frame_name(images, *last), now = frame_name(images, frame);
+        const MotionLayers layers = read_motion(frame_name(*motion, frame), source);
+        const MotionLayers old = read_motion(frame_name(*motion, *last), source);
+        check_seeds(before, now);
+        check_motion(before, now, patterns.layer, layers);
+        const PlacedImage earlier =
+            read_image(frame_name(patterns.output, *last), patterns.layer, ChecksumPolicy::kCheck, std::nullopt);
+        history = std::make_shared<History>(reproject(earlier.image, old.depth, layers));
+      }
+      run(frame, std::move(history));
+      last = frame;
+    } catch (const WrongSequence&) {
+      throw;
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kInput || frames.size() == 1) throw;
+      fmt::print(stderr, "warning: frame {} failed: {}\n", frame, error.what());
+      failed.push_back(frame);
+      last.reset();
     }
-    run(frame, std::move(history));
-    last = frame;
   }
+  if (!failed.empty())
+    throw Error(ErrorCode::kInput,
+                fmt::format("{} of {} frames failed: {}", failed.size(), frames.size(), fmt::join(failed, ", ")));
 }
 
 }  // namespace covary

@@ -43,8 +43,11 @@ struct FramePatterns {
 bool are_frames(const FrameOptions& options, const FramePatterns& patterns);
 
 /// Calls `run` with the number of each frame, and the history of the previous frame if that was run just before. The
-/// motion comes from the first file that has the layer. Throws Error(kInput) if the motion does not match the frames,
-/// or if frames share a seed, because their samples could not reveal the shared errors.
+/// motion comes from the first file that has the layer; without any, there is no history. Before the first frame,
+/// throws Error(kInput) if any file is missing or unreadable, or differs in size or channels from the first frame's. A
+/// frame whose call throws Error(kInput) is reported and left out; the next one starts a new history; Error(kInput)
+/// names such frames in the end. Throws Error(kInput) at once if the motion does not match the frames, or if frames
+/// share a seed, because their samples could not reveal the shared errors.
 void for_each_frame(const FrameOptions& options, const FramePatterns& patterns, bool has_history,
                     const std::function<void(int frame, std::shared_ptr<const History> history)>& run);
 

@@ -50,7 +50,7 @@ bool has_three_channels(const ImageInfo& info, const std::string& layer) {
 }
 
 Image checked_guide(const std::string& path, const std::string& layer) {
-  Image guide = read_image(path, layer).image;
+  Image guide = read_image(path, layer, ChecksumPolicy::kCheck, std::nullopt).image;
   check_guide(path + (layer.empty() ? "" : ": the layer " + layer), guide);
   return guide;
 }

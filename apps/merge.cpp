@@ -28,6 +28,7 @@ namespace fs = std::filesystem;
 struct MergeOptions {
   std::vector<std::string> inputs;
   std::string output;
+  bool overwrite = false;
 };
 
 // ---- images that hold no samples
@@ -118,7 +119,7 @@ Film merged_films(const MergeOptions& options) {
 void merge(const MergeOptions& options) {
   Outputs outputs;
   outputs.reads(options.inputs);
-  outputs.writes("-o", options.output, OutputKind::kFilm);
+  outputs.writes_result("-o", options.output, OutputKind::kFilm, "merge", options.overwrite);
   Film merged = merged_films(options);
   merged.attributes[film_key::kVersion] = COVARY_VERSION;
   merged.attributes[film_key::kCommand] = command_line();
@@ -135,6 +136,7 @@ void add_merge(CLI::App& app) {
       ->required()
       ->expected(2, 100000);
   add_value(*command, "-o,--output", options->output, kFileValue, "The merged film (EXR)")->required();
+  add_overwrite_option(*command, options->overwrite);
   command->callback([options] { merge(*options); });
 }
 

@@ -160,7 +160,7 @@ Outputs files_of(const RenderOptions& options) {
   if (!options.request().save_training.empty())
     outputs.writes("--save-training", options.request().save_training, OutputKind::kText);
   if (options.is_replay()) return outputs;
-  outputs.writes("-o", options.request().output, OutputKind::kFilm);
+  outputs.writes_result("-o", options.request().output, OutputKind::kFilm, "render", options.request().overwrite);
   if (output_target(options.request().output).is_special)
     throw Error(ErrorCode::kUsage,
                 fmt::format("-o '{}' is not a regular file, which a render needs to continue after an "
@@ -220,11 +220,18 @@ void render(RenderOptions options) {
   std::optional<StopFlag> stop(std::in_place);
   const RenderResult result =
       render_watched(options, scene, make_request(options, scene), display.get(), progress, *stop);
-  report({options, scene, result, load_seconds, threads}, *stop);
+  std::optional<Unfinished> missed;
+  try {
+    report({options, scene, result, load_seconds, threads}, *stop);
+  } catch (const Unfinished& unfinished) {
+    if (unfinished.exit_code() != kTargetMissed) throw;
+    missed = unfinished;  // the image is complete, only not as good as asked
+  }
   if (stop->is_set())
     throw Unfinished(stop->exit_code(), fmt::format("interrupted when '{}' was written", options.request().output));
   stop.reset();  // there is nothing more to save
   if (result.complete) write_stages(options, result);
+  if (missed) throw *missed;
 }
 
 }  // namespace

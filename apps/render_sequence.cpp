@@ -155,6 +155,8 @@ class SequenceRender {
     check(options_);
     for (const int frame : frames_) {
       outputs_.push_back(files_of(frame_options(options_, frame)));
+      if (const std::string scene = frame_options(options_, frame).scene; has_many_scenes() && !fs::exists(scene))
+        throw Error(ErrorCode::kIo, fmt::format("cannot read '{}', the scene of frame {}: no such file", scene, frame));
       if (!options_.sequence.camera_path.empty()) outputs_.back().reads(options_.sequence.camera_path);
     }
     display_ = display_of(options_);

@@ -16,6 +16,7 @@
 #include "core/shell_text.h"
 #include "core/srgb.h"
 #include "film/image_writer.h"
+#include "film/outputs.h"
 
 namespace covary {
 namespace {
@@ -43,10 +44,27 @@ VideoWriter::~VideoWriter() {
 void VideoWriter::start(int width, int height) {
   width_ = width, height_ = height;
   // Codecs need even sizes: adds a black column or row. All players support half-resolution chroma (yuv420p).
-  const std::string command =
-      shell_text({"ffmpeg", "-loglevel", "error", "-f", "rawvideo", "-pixel_format", "rgb24", "-video_size",
-                  fmt::format("{}x{}", width, height), "-framerate", fmt::format("{}", rate_), "-i", "-", "-vf",
-                  "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-y", temporary_});
+  const std::string command = shell_text({"ffmpeg",
+                                          "-loglevel",
+                                          "error",
+                                          "-f",
+                                          "rawvideo",
+                                          "-pixel_format",
+                                          "rgb24",
+                                          "-video_size",
+                                          fmt::format("{}x{}", width, height),
+                                          "-framerate",
+                                          fmt::format("{}", rate_),
+                                          "-i",
+                                          "-",
+                                          "-vf",
+                                          "pad=ceil(iw/2)*2:ceil(ih/2)*2",
+                                          "-pix_fmt",
+                                          "yuv420p",
+                                          "-metadata",
+                                          fmt::format("comment={}", kMadeByCovary),
+                                          "-y",
+                                          temporary_});
   std::signal(SIGPIPE, SIG_IGN);  // reported as a write error if ffmpeg ends early
   pipe_ = popen(command.c_str(), "w");
   if (!pipe_) throw Error(ErrorCode::kIo, "cannot start ffmpeg");

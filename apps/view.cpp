@@ -128,7 +128,7 @@ const char* display_of(const std::string& path, const std::vector<ExrFile::Chann
   for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   if (names[0] == names[1] || layer == "Bias") return "range";
   if (lower == "n" || lower == "nn" || lower.find("normal") != std::string::npos) return "direction";
-  return names[0].ends_with('X') || names[0].ends_with('x') ? "range" : "picture";
+  return holds_colours(names) ? "picture" : "range";
 }
 
 /// The layers that the page offers: all but the image itself, alpha and the groups of a film.

@@ -109,6 +109,7 @@ const ColourLayer& single_layer(const std::string& path, const ExrFile& file, co
 GroupedFile::GroupedFile(const std::vector<std::string>& paths, const std::string& layer) {
   COVARY_CHECK(!paths.empty(), "a grouped image needs a file");
   name_ = paths.size() == 1 ? paths[0] : fmt::format("{} … {}", paths.front(), paths.back());
+  source_.files = paths;
   for (const std::string& path : paths) add_file(path, layer, paths.size() == 1);
 }
 
@@ -117,6 +118,9 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
   const ExrFile& file = *files_.back();
   if (files_.size() == 1)
     place_ = file.place();
+  else if (!(file.colours() == files_[0]->colours()))
+    fail(path, fmt::format("its colours are {}, those of {} {}; renders of one picture have the same colour space",
+                           file.colours().text(), source_.files[0], files_[0]->colours().text()));
   else if (!(file.place() == place_))
     fail(path,
          fmt::format(
@@ -133,9 +137,13 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
       fail(path,
            fmt::format("holds {} groups; give one file with all groups, or one file with one image for each group",
                        numbered.size()));
-    for (const ColourLayer& group : numbered) groups_.push_back({0, group.channels});
+    for (const ColourLayer& group : numbered) {
+      groups_.push_back({0, group.channels});
+      source_.used.insert(group.channels.begin(), group.channels.end());
+    }
   } else {
     groups_.push_back({files_.size() - 1, single_layer(path, file, layers, layer).channels});
+    if (files_.size() == 1) source_.picture = groups_[0].channels;
   }
   std::vector<std::string> read;
   for (size_t g = first_group; g < groups_.size(); ++g)

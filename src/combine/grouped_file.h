@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "combine/result_source.h"
 #include "film/exr.h"
 #include "film/grouped_image.h"
 
@@ -26,6 +27,7 @@ class GroupedFile {
   int width() const { return place_.window.width; }
   int height() const { return place_.window.height; }
   const ImagePlace& place() const { return place_; }
+  const ColourSpace& colours() const { return files_[0]->colours(); }
   int groups() const { return static_cast<int>(groups_.size()); }
   /// Samples per pixel of all groups together, averaged over pixels; 0 if the files do not say.
   double samples() const { return samples_; }
@@ -53,6 +55,8 @@ class GroupedFile {
   bool has_half() const { return has_half_; }
   /// For messages.
   const std::string& name() const { return name_; }
+  /// Where an image made of the groups goes in a new version of the first file.
+  const ResultSource& source() const { return source_; }
 
   /// Rows of both arrays of a GroupedImage.
   struct Rows {
@@ -78,6 +82,7 @@ class GroupedFile {
 
   std::vector<std::unique_ptr<ExrFile>> files_;
   std::vector<Group> groups_;
+  ResultSource source_;
   ImagePlace place_;
   double samples_ = 0, samples_of_group_ = 0;
   std::string sampling_, scene_hash_, settings_, light_paths_per_sample_, light_film_, name_, denoised_;

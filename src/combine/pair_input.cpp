@@ -27,6 +27,10 @@ void check_origins(const ImageOrigin& crn, const ImageOrigin& independent, std::
   if (!(crn.place == independent.place))
     throw Error(ErrorCode::kInput, fmt::format("{} has {}, {} has {}; both images must show the same pixels", crn.name,
                                                size(crn), independent.name, size(independent)));
+  if (!(crn.colours == independent.colours))
+    throw Error(ErrorCode::kInput,
+                fmt::format("the colours of {} are {}, those of {} {}; expected one colour space", crn.name,
+                            crn.colours.text(), independent.name, independent.colours.text()));
   if (crn.sampling == "independent" || independent.sampling == "crn")
     findings.push_back({Severity::kError, "the files say that the CRN image was rendered with sampling '" +
                                               crn.sampling + "' and the independent image with '" +

@@ -26,6 +26,7 @@ struct ImageOrigin {
   bool has_light_added = false;      ///< an image to which a light film was added
   bool is_one_film = false;          ///< all groups are of one film of covary, and so of different samples
   std::string denoised;              ///< denoised_by() of film/denoised_by.h
+  ColourSpace colours = {};
 };
 
 /// Appends to `findings` what in the origins argues against combining the images. Throws Error(kInput) if they do not

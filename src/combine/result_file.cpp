@@ -3,12 +3,107 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
 #include <optional>
+#include <set>
+#include <sstream>
 
+#include "film/exr_copy.h"
 #include "film/film_file.h"
 
 namespace covary {
+namespace {
+
+/// Layers of covary's files that describe the samples of their picture, beside the groups.
+constexpr const char* kStatistics[] = {"StdError", "Bias",     "variance_in_groups", "samples",
+                                       "HistoryA", "HistoryB", "HistoryAlbedo",      "HistoryNormal"};
+
+bool is_statistics(const std::string& channel) {
+  std::stringstream parts(channel);  // of which the first may be the name of a part
+  for (std::string layer; std::getline(parts, layer, '.');) {
+    const bool is_group =
+        layer.starts_with("group") && layer.size() > 5 && layer.find_first_not_of("0123456789", 5) == std::string::npos;
+    if (is_group || std::find(std::begin(kStatistics), std::end(kStatistics), layer) != std::end(kStatistics))
+      return true;
+  }
+  return false;
+}
+
+/// The mean alpha of the renders; empty if the first has none, or all have the same.
+std::vector<float> mean_alpha(const ResultSource& source, const std::string& channel) {
+  std::vector<float> first;
+  std::vector<double> sum;
+  bool differs = false;
+  for (const std::string& path : source.files) {
+    const ExrFile file(path);
+    if (!file.find(channel)) return {};
+    const CropWindow& window = file.place().window;
+    std::vector<float> alpha(static_cast<size_t>(window.width) * static_cast<size_t>(window.height));
+    const ExrPlane plane{channel, ExrPlane::Type::kFloat, alpha.data(), sizeof(float)};
+    file.read({&plane, 1});
+    if (first.empty()) first = alpha, sum.resize(alpha.size());
+    if (sum.size() != alpha.size()) return {};
+    for (size_t i = 0; i < sum.size(); ++i) sum[i] += alpha[i], differs |= alpha[i] != first[i];
+  }
+  if (!differs) return {};
+  const auto n = static_cast<double>(source.files.size());
+  for (size_t i = 0; i < sum.size(); ++i) first[i] = static_cast<float>(sum[i] / n);
+  return first;
+}
+
+/// The planes of a picture whose channels have these names; grey, as one channel with the mean, in `grey`.
+void add_picture_planes(const std::array<std::string, 3>& names, Image& image, Image& grey,
+                        std::vector<ExrPlane>& planes) {
+  if (names[0] != names[2]) {
+    for (size_t c = 0; c < 3; ++c)
+      planes.push_back({names[c], ExrPlane::Type::kFloat, image.data.data() + c, 3 * sizeof(float)});
+    return;
+  }
+  grey = Image(image.width, image.height, 1);
+  for (size_t i = 0; i < grey.data.size(); ++i)
+    grey.data[i] = (image.data[3 * i] + image.data[3 * i + 1] + image.data[3 * i + 2]) / 3;
+  add_image_planes(names[0], grey, planes);
+}
+
+/// The image as a new version of the first file.
+std::vector<std::string> write_version(const std::string& path, const std::map<std::string, std::string>& attributes,
+                                       EstimatorResult& result, std::map<std::string, Image>& aovs,
+                                       const ResultSource& source) {
+  const ExrFile file(source.files[0]);
+  ExrChanges changes;
+  changes.attributes = attributes;
+  changes.picture = file.find(source.picture[0]) ? source.picture[0] : "";
+  changes.left_out = statistics_channels(file);
+  changes.left_out.insert(source.used.begin(), source.used.end());
+  Image grey;
+  add_picture_planes(source.picture, result.estimate, grey, changes.planes);
+  if (!result.std_error.data.empty()) add_image_planes("StdError", result.std_error, changes.planes);
+  if (!result.bias.data.empty()) add_image_planes("Bias", result.bias, changes.planes);
+  const std::vector<ColourLayer> layers = colour_layers(file.channels());
+  for (auto& [name, image] : aovs) {
+    const auto old = std::find_if(layers.begin(), layers.end(), [&](const auto& layer) { return layer.name == name; });
+    if (old != layers.end() && image.channels == 3)
+      add_picture_planes(old->channels, image, grey, changes.planes);
+    else
+      add_image_planes(name, image, changes.planes);
+  }
+  const std::string alpha = alpha_channel(file.channels(), source.picture[0]);
+  std::vector<float> mean;
+  if (source.files.size() > 1 && !alpha.empty()) mean = mean_alpha(source, alpha);
+  if (!mean.empty()) changes.planes.push_back({alpha, ExrPlane::Type::kFloat, mean.data(), sizeof(float)});
+  return write_changed_exr(path, source.files[0], changes);
+}
+
+}  // namespace
+
+std::set<std::string> statistics_channels(const ExrFile& file) {
+  std::set<std::string> names;
+  if (!file.attributes().contains(std::string("covary:") + film_key::kVersion)) return names;
+  for (const ExrFile::Channel& channel : file.channels())
+    if (is_statistics(channel.name)) names.insert(channel.name);
+  return names;
+}
 
 std::map<std::string, std::string> prediction_attributes(const std::optional<PredictedError>& predicted) {
   std::map<std::string, std::string> attributes;
@@ -19,18 +114,20 @@ std::map<std::string, std::string> prediction_attributes(const std::optional<Pre
   return attributes;
 }
 
-void write_result(const std::string& path, const ImagePlace& place,
-                  const std::map<std::string, std::string>& attributes, EstimatorResult& result,
-                  std::map<std::string, Image>& aovs) {
+std::vector<std::string> write_result(const std::string& path, const ImagePlace& place,
+                                      const std::map<std::string, std::string>& attributes, EstimatorResult& result,
+                                      std::map<std::string, Image>& aovs, const ResultSource& source) {
+  std::map<std::string, std::string> all = attributes;
+  const auto predicted = predicted_error(result, std::numeric_limits<double>::infinity(), 0);
+  for (const auto& [key, value] : prediction_attributes(predicted)) all["covary:" + key] = value;
+  if (!source.files.empty() && is_exr_image(source.files[0])) return write_version(path, all, result, aovs, source);
   std::vector<ExrPlane> planes;
   add_image_planes("", result.estimate, planes);
   if (!result.std_error.data.empty()) add_image_planes("StdError", result.std_error, planes);
   if (!result.bias.data.empty()) add_image_planes("Bias", result.bias, planes);
   for (auto& [name, image] : aovs) add_image_planes(name, image, planes);
-  std::map<std::string, std::string> all = attributes;
-  const auto predicted = predicted_error(result, std::numeric_limits<double>::infinity(), 0);
-  for (const auto& [key, value] : prediction_attributes(predicted)) all["covary:" + key] = value;
   write_exr(path, place, all, planes);
+  return {};
 }
 
 }  // namespace covary

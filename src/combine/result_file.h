@@ -4,8 +4,11 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
+#include <vector>
 
+#include "combine/result_source.h"
 #include "estimators/estimator_result.h"
 #include "film/exr.h"
 #include "film/grouped_image.h"
@@ -17,9 +20,14 @@ namespace covary {
 std::map<std::string, std::string> prediction_attributes(const std::optional<PredictedError>& predicted);
 
 /// Writes R, G, B, if there is an error estimate StdError.R, .G, .B and Bias.R, .G, .B, and the auxiliary images by
-/// name, with string attributes. The file appears under its name only when complete. Throws Error(kIo).
-void write_result(const std::string& path, const ImagePlace& place,
-                  const std::map<std::string, std::string>& attributes, EstimatorResult& result,
-                  std::map<std::string, Image>& aovs);
+/// name, with string attributes; if `source` has files, as a new version of the first one. Its alpha is the mean over
+/// the files, as the picture is; statistics of its samples by covary are left out. The file appears under its name only
+/// when complete. Returns what could not be kept, one sentence each. Throws Error(kIo), and like ExrFile.
+std::vector<std::string> write_result(const std::string& path, const ImagePlace& place,
+                                      const std::map<std::string, std::string>& attributes, EstimatorResult& result,
+                                      std::map<std::string, Image>& aovs, const ResultSource& source = {});
+
+/// Channels in a file of covary that describe its samples: groups, their number, errors, history.
+std::set<std::string> statistics_channels(const ExrFile& file);
 
 }  // namespace covary

@@ -2,78 +2,30 @@
 #include "film/exr.h"
 
 #include <OpenEXR/ImfChannelList.h>
-#include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
-#include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfInputPart.h>
+#include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfMultiPartInputFile.h>
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfPartType.h>
+#include <OpenEXR/ImfStandardAttributes.h>
 #include <OpenEXR/ImfStringAttribute.h>
-#include <OpenEXR/ImfThreading.h>
 #include <fmt/format.h>
-#include <fmt/ranges.h>
-#include <tbb/global_control.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
-#include <mutex>
 
 #include "core/parallel.h"
-#include "film/output_file.h"
+#include "film/exr_library.h"
 #include "imageio/exr_image.h"
 
 namespace covary {
-namespace Imf = OPENEXR_IMF_NAMESPACE;
 namespace {
-
-/// An image larger than this in either direction is taken as damage.
-constexpr int kMaxSize = 1 << 18;
-/// Tiles larger than this in either direction are taken as damage.
-constexpr int kMaxTile = 1 << 12;
-
-/// OutputFile as an OpenEXR stream. OpenEXR ignores errors in its last write, the line offset table; OutputFile
-/// remembers them for commit().
-class Stream : public Imf::OStream {
- public:
-  Stream(OutputFile& file, const std::string& name) : Imf::OStream(name.c_str()), file_(file) {}
-  void write(const char c[], int n) override { file_.write(c, static_cast<size_t>(n)); }
-  uint64_t tellp() override { return file_.position(); }
-  void seekp(uint64_t position) override { file_.seek(position); }
-
- private:
-  OutputFile& file_;
-};
-
-/// Configures OpenEXR: limits, and as many threads as the rest of the program may use now.
-void prepare_library() {
-  static std::mutex mutex;
-  static int current = -1;
-  const std::lock_guard lock(mutex);
-  if (current < 0) Imf::Header::setMaxImageSize(kMaxSize, kMaxSize), Imf::Header::setMaxTileSize(kMaxTile, kMaxTile);
-  const auto allowed =
-      static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
-  const int wanted = allowed > 1 ? allowed : 0;  // 0: the calling thread does the work
-  if (wanted != current) Imf::setGlobalThreadCount(current = wanted);
-}
-
-Imf::PixelType pixel_type(const ExrPlane& plane) {
-  return plane.type == ExrPlane::Type::kUint ? Imf::UINT : Imf::FLOAT;
-}
-
-Imf::Slice slice(const ExrPlane& plane, const Imath::Box2i& window) {
-  const size_t width = static_cast<size_t>(int64_t{window.max.x} - window.min.x + 1);
-  return Imf::Slice::Make(pixel_type(plane), plane.base, window, plane.pixel_stride, plane.pixel_stride * width);
-}
 
 [[noreturn]] void fail(const std::string& path, const std::string& what) {
   throw Error(ErrorCode::kInput, path + ": " + what);
-}
-
-const char* type_name(Imf::PixelType type) {
-  return type == Imf::HALF ? "half" : type == Imf::FLOAT ? "float" : "uint";
 }
 
 std::string compression_name(Imf::Compression compression) {
@@ -92,14 +44,17 @@ double largest_ratio(const std::string& compression) {
   return 1e5;
 }
 
-const char* type_name(ExrPlane::Type type) { return type == ExrPlane::Type::kUint ? "uint" : "float"; }
-
-/// Windows and channels (each "name type") as hashed for the header's checksum.
-std::string shape_text(const ImagePlace& place, const std::vector<std::string>& channels) {
-  const CropWindow& w = place.window;
-  return fmt::format("{} {} {} {} {} {}\n{}", place.frame_width, place.frame_height, w.x, w.y, w.width, w.height,
-                     fmt::join(channels, "\n"));
+/// Of all parts, which share it.
+ColourSpace colour_space_of(const Imf::Header& header, const std::map<std::string, std::string>& attributes) {
+  if (Imf::hasChromaticities(header)) {
+    const Imf::Chromaticities& c = Imf::chromaticities(header);
+    return {{c.red.x, c.red.y}, {c.green.x, c.green.y}, {c.blue.x, c.blue.y}, {c.white.x, c.white.y}};
+  }
+  const auto* aces = header.findTypedAttribute<Imf::IntAttribute>("acesImageContainerFlag");
+  return aces && aces->value() == 1 ? aces_colour_space() : named_colour_space(attributes);
 }
+
+const char* type_name(ExrPlane::Type type) { return type == ExrPlane::Type::kUint ? "uint" : "float"; }
 
 Checksums checksums_of(const ImagePlace& place, const std::map<std::string, std::string>& attributes,
                        std::span<const ExrPlane> planes) {
@@ -111,7 +66,7 @@ Checksums checksums_of(const ImagePlace& place, const std::map<std::string, std:
     sorted.push_back(plane);
     names.push_back(name + " " + type_name(plane->type));
   }
-  Checksums sums{crc_of_header(shape_text(place, names), attributes), std::vector<uint32_t>(sorted.size())};
+  Checksums sums{crc_of_header(exr_shape_text(place, names), attributes), std::vector<uint32_t>(sorted.size())};
   const size_t n_pixels = static_cast<size_t>(place.window.width) * static_cast<size_t>(place.window.height);
   parallel_for(sorted.size(), [&](size_t i) {
     sums.channels[i] = crc_of_values(0, sorted[i]->base, n_pixels, sorted[i]->pixel_stride);
@@ -136,7 +91,7 @@ void add_image_planes(const std::string& name, Image& image, std::vector<ExrPlan
 
 void write_exr(const std::string& path, const ImagePlace& place, const std::map<std::string, std::string>& attributes,
                std::span<const ExrPlane> planes, ExrCompression compression) {
-  prepare_library();
+  prepare_exr_library();
   const CropWindow& w = place.window;
   const Imath::Box2i window({w.x, w.y}, {w.x + w.width - 1, w.y + w.height - 1});
   Imf::Header header(Imath::Box2i({0, 0}, {place.frame_width - 1, place.frame_height - 1}), window);
@@ -145,12 +100,12 @@ void write_exr(const std::string& path, const ImagePlace& place, const std::map<
   header.insert(kChecksums, Imf::StringAttribute(checksums_of(place, attributes, planes).text()));
   Imf::FrameBuffer pixels;
   for (const ExrPlane& plane : planes) {
-    header.channels().insert(plane.name, Imf::Channel(pixel_type(plane)));
-    pixels.insert(plane.name, slice(plane, window));
+    header.channels().insert(plane.name, Imf::Channel(exr_pixel_type(plane)));
+    pixels.insert(plane.name, exr_slice(plane, window));
   }
   OutputFile file(path);
   try {
-    Stream stream(file, path);
+    ExrStream stream(file, path);
     Imf::OutputFile exr(stream, header);
     exr.setFrameBuffer(pixels);
     exr.writePixels(w.height);
@@ -172,7 +127,7 @@ struct ExrFile::Handle {
 ExrFile::~ExrFile() = default;
 
 ExrFile::ExrFile(const std::string& path, ChecksumPolicy checksums) : path_(path) {
-  prepare_library();
+  prepare_exr_library();
   // OpenEXR's own messages do not distinguish a missing file from a damaged one.
   if (!is_exr(path)) fail(path, "not an EXR file");
   check_exr_header(path);
@@ -185,20 +140,23 @@ ExrFile::ExrFile(const std::string& path, ChecksumPolicy checksums) : path_(path
   const int n_parts = handle_->file.parts();
   for (int part = 0; part < n_parts; ++part) {
     const Imf::Header& header = handle_->file.header(part);
-    if (header.hasType() && Imf::isDeepData(header.type())) fail(path, "deep EXR files are not supported");
+    if (header.hasType() && Imf::isDeepData(header.type())) {
+      if (n_parts == 1) fail(path, "deep EXR files are not supported");
+      continue;
+    }
     const Imath::Box2i display = header.displayWindow(), window = header.dataWindow();
     const auto extent = [](int low, int high) { return static_cast<int64_t>(high) - low + 1; };
     const int64_t width = extent(window.min.x, window.max.x), height = extent(window.min.y, window.max.y);
     const int64_t frame_width = extent(display.min.x, display.max.x),
                   frame_height = extent(display.min.y, display.max.y);
     if (std::min({width, height, frame_width, frame_height}) < 1 ||
-        std::max({width, height, frame_width, frame_height}) > kMaxSize)
+        std::max({width, height, frame_width, frame_height}) > kMaxExrSize)
       fail(path, fmt::format("{} x {} pixels in a frame of {} x {}; expected 1 to {} in each direction", width, height,
-                             frame_width, frame_height, kMaxSize));
+                             frame_width, frame_height, kMaxExrSize));
     ImagePlace place{static_cast<int>(frame_width), static_cast<int>(frame_height), {}};
     place.window = {window.min.x - display.min.x, window.min.y - display.min.y, static_cast<int>(width),
                     static_cast<int>(height)};
-    if (part == 0) {
+    if (channels_.empty()) {
       place_ = place;
       handle_->window = window;
       compression_ = compression_name(header.compression());
@@ -209,10 +167,12 @@ ExrFile::ExrFile(const std::string& path, ChecksumPolicy checksums) : path_(path
     for (auto it = header.channels().begin(); it != header.channels().end(); ++it) {
       const Imf::Channel& channel = it.channel();
       if (channel.xSampling != 1 || channel.ySampling != 1)
-        fail(path, fmt::format("channel {} is sub-sampled, which is not supported", it.name()));
+        fail(path,
+             fmt::format("channel {} is sub-sampled, which is not supported{}", it.name(),
+                         std::string(it.name()).ends_with("Y") ? ": luminance and chroma; expected R, G and B" : ""));
       std::string name = it.name();
       if (!name.starts_with(prefix)) name.insert(0, prefix);
-      channels_.push_back({name, type_name(channel.type)});
+      channels_.push_back({name, exr_type_name(channel.type)});
       handle_->parts[name] = {part, it.name()};
     }
     for (auto it = header.begin(); it != header.end(); ++it) {
@@ -223,7 +183,8 @@ ExrFile::ExrFile(const std::string& path, ChecksumPolicy checksums) : path_(path
                                it.attribute().typeName()));
     }
   }
-  if (channels_.empty()) fail(path, "an EXR file without channels");
+  if (channels_.empty()) fail(path, "an EXR file without channels of pixels with one value each");
+  colours_ = colour_space_of(handle_->file.header(0), attributes_);
 
   check_pixels();
   if (checksums == ChecksumPolicy::kCheck) check_header();
@@ -241,7 +202,7 @@ void ExrFile::check_header() {
 std::string ExrFile::shape_text() const {
   std::vector<std::string> names;
   for (const Channel& channel : channels_) names.push_back(channel.name + " " + channel.type);
-  return covary::shape_text(place_, names);
+  return exr_shape_text(place_, names);
 }
 
 void ExrFile::check_channel(const std::string& name, uint32_t crc) const {
@@ -251,11 +212,16 @@ void ExrFile::check_channel(const std::string& name, uint32_t crc) const {
 }
 
 void ExrFile::check(std::span<const std::string> channels) const {
-  if (!checksums_) return;
+  if (checksums_) checksums_of(channels);
+}
+
+std::vector<uint32_t> ExrFile::checksums_of(std::span<const std::string> channels) const {
   constexpr size_t kValuesAtOnce = size_t{1} << 20;
+  std::vector<uint32_t> sums(channels.size(), 0);
+  if (channels.empty()) return sums;
   const size_t width = static_cast<size_t>(place_.window.width), height = static_cast<size_t>(place_.window.height);
   const size_t rows = std::min(std::max<size_t>(kValuesAtOnce / (width * channels.size()), 1), height);
-  std::vector<uint32_t> values(rows * width * channels.size()), sums(channels.size(), 0);
+  std::vector<uint32_t> values(rows * width * channels.size());
   std::vector<ExrPlane> planes;
   for (size_t c = 0; c < channels.size(); ++c) {
     const auto type = find(channels[c])->type == "uint" ? ExrPlane::Type::kUint : ExrPlane::Type::kFloat;
@@ -267,7 +233,8 @@ void ExrFile::check(std::span<const std::string> channels) const {
     for (size_t c = 0; c < channels.size(); ++c)
       sums[c] = crc_of_values(sums[c], planes[c].base, n * width, sizeof(uint32_t));
   }
-  for (size_t c = 0; c < channels.size(); ++c) check_channel(channels[c], sums[c]);
+  for (size_t c = 0; checksums_ && c < channels.size(); ++c) check_channel(channels[c], sums[c]);
+  return sums;
 }
 
 void ExrFile::check_pixels() const {
@@ -318,7 +285,7 @@ void ExrFile::read_rows(std::span<const ExrPlane> planes, int first_row, int n_r
   for (const ExrPlane& plane : planes) {
     const auto it = handle_->parts.find(plane.name);
     COVARY_CHECK(it != handle_->parts.end(), "channel " + plane.name + " exists");
-    buffers[it->second.first].insert(it->second.second, slice(plane, rows));
+    buffers[it->second.first].insert(it->second.second, exr_slice(plane, rows));
   }
   try {
     for (const auto& [part, buffer] : buffers) {

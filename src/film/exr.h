@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "film/colour_space.h"
 #include "film/film.h"
 #include "imageio/checksums.h"
 
@@ -64,6 +65,8 @@ class ExrFile {
   const Channel* find(const std::string& name) const;
   const std::map<std::string, std::string>& attributes() const { return attributes_; }  ///< string attributes only
   const std::string& compression() const { return compression_; }
+  /// By the attribute `chromaticities`, of an ACES container, or by name; Rec. 709 without any of them.
+  const ColourSpace& colours() const { return colours_; }
 
   /// Reads the named channels, all of which must exist; values are converted to the plane's type. Throws Error(kInput)
   /// when the file is truncated, its pixels are damaged, or they do not match the checksums of these channels.
@@ -71,6 +74,9 @@ class ExrFile {
   /// Reads the named channels only to verify their checksums, in little memory; throws like read(). Does nothing if the
   /// file has no checksums.
   void check(std::span<const std::string> channels) const;
+  /// The checksums of the named channels, of halves those of their values as floats, in little memory; throws like
+  /// read().
+  std::vector<uint32_t> checksums_of(std::span<const std::string> channels) const;
   /// Reads `n_rows` rows of the window, starting at `first_row`, without verifying checksums; planes hold these rows
   /// only.
   void read_rows(std::span<const ExrPlane> planes, int first_row, int n_rows) const;
@@ -90,6 +96,7 @@ class ExrFile {
   std::vector<Channel> channels_;
   std::map<std::string, std::string> attributes_;
   std::string compression_;
+  ColourSpace colours_;
   std::optional<Checksums> checksums_;  // to be verified; empty if there are none or they are ignored
 };
 

@@ -53,8 +53,7 @@ std::vector<std::string> channels_that_end(const std::vector<ExrFile::Channel>& 
 /// The channels of `layer` if it has three that belong together, or luminance alone; empty otherwise.
 std::vector<std::string> find_layer(const std::vector<ExrFile::Channel>& channels, const std::string& layer) {
   std::vector<Suffixes> accepted(kSuffixes.begin(), kSuffixes.end());
-  // X Y Z without a layer name would be a colour space, not the components of a vector.
-  if (!layer.empty()) accepted.push_back({"x", "y", "z"});
+  accepted.push_back({"x", "y", "z"});  // of a vector; without a layer's name, CIE XYZ
   accepted.push_back({"y", "y", "y"});
   for (const Suffixes& suffixes : accepted)
     if (std::vector<std::string> names = channels_that_end(channels, layer, suffixes); !names.empty()) return names;
@@ -114,6 +113,8 @@ void require_image_memory(const std::string& path, int width, int height, double
 std::vector<std::string> layer_channels(const std::string& path, const std::vector<ExrFile::Channel>& channels,
                                         const std::string& layer) {
   std::vector<std::string> names = find_layer(channels, layer);
+  if (!names.empty() && names[0] == names[2] && !channels_that_end(channels, layer, {"y", "ry", "by"}).empty())
+    fail(path, "luminance and chroma (channels Y, RY, BY); expected R, G and B");
   if (!names.empty()) return names;
   const std::vector<Layer> layers = find_layers(channels);
   if (layer.empty() && layers.size() == 1) return layers[0].channels;
@@ -147,7 +148,7 @@ ImageInfo info_of(const ImageHeader& header) {
 ImageInfo inspect_image(const std::string& path, ChecksumPolicy checksums) {
   if (is_exr_image(path)) {
     const ExrFile file(path, checksums);
-    return {"openexr", file.compression(), file.place(), file.channels(), file.attributes()};
+    return {"openexr", file.compression(), file.place(), file.channels(), file.attributes(), file.colours()};
   }
   return info_of(open_image(path)->header());
 }
@@ -185,13 +186,36 @@ std::vector<Image> read_layers(const ExrFile& file, const std::string& path, std
 }
 
 std::vector<Image> read_layers(const std::string& path, std::span<const std::string> layers) {
+  std::vector<Image> images;
   if (is_exr_image(path)) {
     const ExrFile file(path);
-    return read_layers(file, path, layers, 0, file.place().window.height);
+    images = read_layers(file, path, layers, 0, file.place().window.height);
+    for (size_t i = 0; i < layers.size(); ++i) {
+      const std::vector<std::string> channels = layer_channels(path, file.channels(), layers[i]);
+      if (const ColourSpace own = layer_colours(file.colours(), channels);
+          holds_colours(channels) && !(own == ColourSpace::rec709()))
+        convert_colours(colour_conversion(own, ColourSpace::rec709()), images[i]);
+    }
+    return images;
   }
-  std::vector<Image> images;
   for (const std::string& layer : layers) images.push_back(read_image(path, layer).image);
   return images;
+}
+
+bool holds_colours(std::span<const std::string> channels) {
+  if (channels[0] == channels[2]) return false;
+  const size_t dot = channels[0].rfind('.');
+  if (lower(std::string(last_part(channels[0]))) == "x") return dot == std::string::npos;
+  const std::string layer = dot == std::string::npos ? "" : channels[0].substr(0, dot);
+  const std::string name = lower(std::string(last_part(layer)));
+  const auto has = [&](const char* word) { return name.find(word) != std::string::npos; };
+  constexpr std::array kVectors = {"n", "nn", "ns", "ng", "p", "uv", "motion", "velocity"};
+  return !has("normal") && !has("position") && !has("crypto") &&
+         std::find(kVectors.begin(), kVectors.end(), name) == kVectors.end();
+}
+
+ColourSpace layer_colours(const ColourSpace& of_file, std::span<const std::string> channels) {
+  return lower(std::string(last_part(channels[0]))) == "x" ? ColourSpace::xyz() : of_file;
 }
 
 std::vector<ColourLayer> colour_layers(const std::vector<ExrFile::Channel>& channels) {
@@ -201,6 +225,10 @@ std::vector<ColourLayer> colour_layers(const std::vector<ExrFile::Channel>& chan
     for (const Suffixes& suffixes : kSuffixes)
       if (auto found = channels_that_end(by_layer.channels.at(name), name, suffixes); !found.empty())
         layers.push_back({name, {found[0], found[1], found[2]}});
+  const auto is_unnamed = [](const ColourLayer& layer) { return layer.name.empty(); };
+  if (by_layer.channels.contains("") && std::none_of(layers.begin(), layers.end(), is_unnamed))
+    if (auto xyz = channels_that_end(by_layer.channels.at(""), "", {"x", "y", "z"}); !xyz.empty())
+      layers.push_back({"", {xyz[0], xyz[1], xyz[2]}});
   return layers;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -20,6 +21,7 @@ struct ImageInfo {
   ImagePlace place;
   std::vector<ExrFile::Channel> channels;
   std::map<std::string, std::string> attributes;
+  ColourSpace colours = {};
 };
 
 struct PlacedImage {
@@ -48,14 +50,23 @@ void require_image_memory(const std::string& path, int width, int height, double
 
 /// Reads three channels as linear RGB (integer files are decoded from sRGB). `layer` selects the channels: "N" for N.X
 /// N.Y N.Z, "group03" for group03.R/G/B, or the full name of a single channel, returned as grey; "" is the picture
-/// (find_picture), or Y, or the only layer there is. Throws like inspect_image; for an unknown layer, throws
-/// Error(kInput) listing the existing ones.
+/// (find_picture), or X Y Z, or Y, or the only layer there is. Colours (holds_colours) are converted to `colours`; none:
+/// as stored. Throws like inspect_image; for an unknown layer, throws Error(kInput) listing the existing ones.
 PlacedImage read_image(const std::string& path, const std::string& layer = "",
-                       ChecksumPolicy checksums = ChecksumPolicy::kCheck);
-/// Reads several layers, which share no channel, in one pass over the file, in the file's window; throws like
-/// read_image.
+                       ChecksumPolicy checksums = ChecksumPolicy::kCheck,
+                       const std::optional<ColourSpace>& colours = ColourSpace::rec709());
+/// The alpha of such a layer, 1 channel; empty if it has none. Throws like read_image().
+struct Alpha {
+  Image values;
+  bool straight = false;  ///< the layer's colours are not multiplied by it, as in PNG
+};
+Alpha read_alpha(const std::string& path, const std::string& layer = "",
+                 ChecksumPolicy checksums = ChecksumPolicy::kCheck);
+/// Reads several layers, which share no channel, in one pass over the file, in the file's window, as Rec. 709; throws
+/// like read_image.
 std::vector<Image> read_layers(const std::string& path, std::span<const std::string> layers);
-/// Same for `n_rows` rows of the window, starting at `first_row`; verifies checksums only if these are all its rows.
+/// Same for `n_rows` rows of the window, starting at `first_row`, as stored; verifies checksums only if these are all
+/// its rows.
 std::vector<Image> read_layers(const ExrFile& file, const std::string& path, std::span<const std::string> layers,
                                int first_row, int n_rows);
 
@@ -63,6 +74,12 @@ std::vector<Image> read_layers(const ExrFile& file, const std::string& path, std
 /// read_image.
 std::vector<std::string> layer_channels(const std::string& path, const std::vector<ExrFile::Channel>& channels,
                                         const std::string& layer);
+
+/// Whether a layer with these three channels holds colours, to which a file's colour space applies: red, green and blue
+/// of anything but directions, positions and identifiers (Cryptomatte); or X, Y and Z without a layer's name.
+bool holds_colours(std::span<const std::string> channels);
+/// The colour space of such a layer: of the file, or CIE XYZ.
+ColourSpace layer_colours(const ColourSpace& of_file, std::span<const std::string> channels);
 
 /// Three channels of one colour image in a file.
 struct ColourLayer {

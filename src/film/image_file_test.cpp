@@ -4,12 +4,15 @@
 
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfDeepScanLineOutputFile.h>
+#include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfMultiPartOutputFile.h>
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfOutputPart.h>
 #include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfRgbaFile.h>
+#include <OpenEXR/ImfStandardAttributes.h>
 #include <OpenEXR/ImfThreading.h>
 #include <OpenEXR/ImfTiledRgbaFile.h>
 #include <gtest/gtest.h>
@@ -297,6 +300,62 @@ TEST(ImageLayers, AreTriplesAndSingleChannels) {
   const std::vector<ExrFile::Channel> channels{{"B", "half"},   {"G", "half"},   {"R", "half"},   {"A", "half"},
                                                {"N.X", "half"}, {"N.Y", "half"}, {"N.Z", "half"}, {"depth.Z", "float"}};
   EXPECT_EQ(image_layers(channels), (std::vector<std::string>{"", "N", "A", "depth.Z"}));
+}
+
+/// A file of 1 x 1 pixels with these float channels of value 0.25, 0.5, …
+void write_pixel(const std::string& path, const std::vector<std::string>& channels, const Imf::Header& like) {
+  Imf::Header header = like;
+  header.dataWindow() = header.displayWindow() = Imath::Box2i({0, 0}, {0, 0});
+  std::vector<float> values;
+  for (size_t i = 0; i < channels.size(); ++i) values.push_back(0.25f * static_cast<float>(i + 1));
+  Imf::FrameBuffer buffer;
+  for (size_t i = 0; i < channels.size(); ++i) {
+    header.channels().insert(channels[i], Imf::Channel(Imf::FLOAT));
+    buffer.insert(channels[i], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(&values[i]), 4, 4));
+  }
+  Imf::OutputFile file(path.c_str(), header);
+  file.setFrameBuffer(buffer);
+  file.writePixels(1);
+}
+
+TEST(ImageFile, ColoursHaveASpaceAndVectorsHaveNone) {
+  const std::string path = test_file("a.exr");
+  Imf::Header header;
+  header.insert("acesImageContainerFlag", Imf::IntAttribute(1));
+  write_pixel(path, {"R", "G", "B", "N.R", "N.G", "N.B"}, header);
+  EXPECT_EQ(inspect_image(path).colours.text(), "ACES2065-1");
+  const auto rgb = [](const Image& image) { return image.rgb(0, 0); };
+  // ACES2065-1 to Rec. 709 with Bradford's adaptation, as in OpenColorIO's ACES configurations.
+  const Spectrum converted = rgb(read_image(path).image), stored(0.25f, 0.5f, 0.75f);
+  EXPECT_NEAR(converted.r, 2.52169 * 0.25 - 1.13413 * 0.5 - 0.38756 * 0.75, 2e-5);
+  EXPECT_NEAR(converted.g, -0.27648 * 0.25 + 1.37272 * 0.5 - 0.09624 * 0.75, 2e-5);
+  EXPECT_NEAR(converted.b, -0.01538 * 0.25 - 0.15298 * 0.5 + 1.16835 * 0.75, 2e-5);
+  EXPECT_EQ(rgb(read_image(path, "", ChecksumPolicy::kCheck, std::nullopt).image), stored);
+  EXPECT_EQ(rgb(read_image(path, "N").image), Spectrum(1, 1.25f, 1.5f)) << "normals";
+  EXPECT_EQ(rgb(read_layers(path, std::vector<std::string>{"", "N"})[0]), converted);
+
+  // Chromaticities go before the flag.
+  Imf::addChromaticities(header, Imf::Chromaticities());
+  write_pixel(path, {"R", "G", "B"}, header);
+  EXPECT_EQ(rgb(read_image(path).image), stored);
+}
+
+TEST(ImageFile, ThreeNamelessComponentsAreXyzOrAVector) {
+  const std::string path = test_file("a.exr");
+  write_pixel(path, {"X", "Y", "Z"}, {});
+  EXPECT_EQ(read_image(path, "", ChecksumPolicy::kCheck, std::nullopt).image.rgb(0, 0), Spectrum(0.25f, 0.5f, 0.75f));
+  // As colours, CIE XYZ: the inverse of the matrix in IEC 61966-2-1.
+  const Spectrum rgb = read_image(path).image.rgb(0, 0);
+  EXPECT_NEAR(rgb.r, 3.2406 * 0.25 - 1.5372 * 0.5 - 0.4986 * 0.75, 4e-4);
+  EXPECT_NEAR(rgb.g, -0.9689 * 0.25 + 1.8758 * 0.5 + 0.0415 * 0.75, 4e-4);
+  EXPECT_NEAR(rgb.b, 0.0557 * 0.25 - 0.2040 * 0.5 + 1.0570 * 0.75, 4e-4);
+}
+
+TEST(ImageFile, LuminanceAndChromaAreNoGreyPicture) {
+  const std::string path = test_file("a.exr");
+  write_pixel(path, {"Y", "RY", "BY"}, {});
+  EXPECT_TRUE(contains(message_of([&] { read_image(path); }, ErrorCode::kInput),
+                       "luminance and chroma (channels Y, RY, BY); expected R, G and B"));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/srgb.h"
+#include "film/exr_copy.h"
 #include "imageio/exr_image.h"
 
 namespace covary {
@@ -35,6 +36,7 @@ ImageRows::ImageRows(const std::string& path, const std::string& layer, Checksum
     exr_ = std::make_unique<ExrFile>(path, checksums);
     place_ = exr_->place();
     names_ = layer_channels(path, exr_->channels(), layer);
+    colours_ = layer_colours(exr_->colours(), names_);
     return;
   }
   file_ = open_image(path);
@@ -44,11 +46,26 @@ ImageRows::ImageRows(const std::string& path, const std::string& layer, Checksum
   low_dynamic_range_ = !file_->header().floating_point;
 }
 
+void ImageRows::convert_to(const ColourSpace& colours) {
+  conversion_.reset();
+  if (holds_colours(names_) && !(colours_ == colours)) try {
+      conversion_ = colour_conversion(colours_, colours);
+    } catch (const Error& error) {
+      throw Error(error.code(), path_ + ": " + error.what());
+    }
+}
+
 Image ImageRows::read(int first_row, int n_rows) {
+  Image image = read_stored(first_row, n_rows);
+  if (conversion_) convert_colours(*conversion_, image);
+  return image;
+}
+
+Image ImageRows::read_stored(int first_row, int n_rows) {
   if (exr_) return read_exr(first_row, n_rows);
   const bool is_all = n_rows == place_.window.height;
   if (is_all || file_->has_rows()) return read_other(first_row, n_rows);
-  if (whole_.data.empty()) whole_ = read_all();
+  if (whole_.data.empty()) whole_ = read_other(0, place_.window.height);
   Image rows(whole_.width, n_rows, 3);
   std::copy_n(whole_.pixel(0, first_row), rows.data.size(), rows.data.begin());
   return rows;
@@ -85,11 +102,35 @@ Image ImageRows::read_other(int first_row, int n_rows) {
   return image;
 }
 
-PlacedImage read_image(const std::string& path, const std::string& layer, ChecksumPolicy checksums) {
+PlacedImage read_image(const std::string& path, const std::string& layer, ChecksumPolicy checksums,
+                       const std::optional<ColourSpace>& colours) {
   ImageRows file(path, layer, checksums);
+  if (colours) file.convert_to(*colours);
   PlacedImage result{file.place(), {}, file.low_dynamic_range()};
   result.image = file.read_all();
   return result;
+}
+
+Alpha read_alpha(const std::string& path, const std::string& layer, ChecksumPolicy checksums) {
+  Alpha alpha;
+  if (is_exr_image(path)) {
+    const ExrFile file(path, checksums);
+    const std::string name = alpha_channel(file.channels(), layer_channels(path, file.channels(), layer)[0]);
+    if (name.empty()) return alpha;
+    const CropWindow& window = file.place().window;
+    require_image_memory(path, window.width, window.height, sizeof(float));
+    alpha.values = Image(window.width, window.height, 1);
+    const ExrPlane plane{name, ExrPlane::Type::kFloat, alpha.values.data.data(), sizeof(float)};
+    file.read({&plane, 1});
+    return alpha;
+  }
+  const std::unique_ptr<ImageReader> file = open_image(path);
+  const ImageHeader& header = file->header();
+  if (header.alpha_channel < 0 || !layer.empty()) return alpha;
+  alpha.straight = header.straight_alpha;
+  alpha.values = Image(header.width, header.height, 1);
+  alpha.values.data = file->read_floats(header.alpha_channel, header.alpha_channel + 1);
+  return alpha;
 }
 
 }  // namespace covary

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,11 @@ class ImageRows {
   const ImagePlace& place() const { return place_; }
   /// Whether the file holds 8- or 16-bit integers.
   bool low_dynamic_range() const { return low_dynamic_range_; }
+  /// Of the three channels as stored.
+  const ColourSpace& colours() const { return colours_; }
+  /// From now on, read() converts colours (holds_colours) to this space. At first, it returns values as stored. Throws
+  /// Error(kInput) if the file's own space is none.
+  void convert_to(const ColourSpace& colours);
 
   /// `n_rows` rows of the window, starting at `first_row`. Formats without row access (tiles, except in EXR) are read
   /// whole, once. The checksums of a film are verified before its first rows are returned. Throws like read_image().
@@ -28,10 +34,13 @@ class ImageRows {
   Image read_all() { return read(0, place_.window.height); }
 
  private:
+  Image read_stored(int first_row, int n_rows);
   Image read_exr(int first_row, int n_rows);
   Image read_other(int first_row, int n_rows);
   std::string path_, layer_;
   ImagePlace place_;
+  ColourSpace colours_;
+  std::optional<ColourMatrix> conversion_;
   bool low_dynamic_range_ = false;
   std::vector<std::string> names_;     // of the three channels
   std::unique_ptr<ExrFile> exr_;       // exactly one of

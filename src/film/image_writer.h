@@ -16,18 +16,24 @@ const std::vector<std::string>& image_extensions();
 /// The file extension including its dot, in lower case; "" if there is none.
 std::string lower_extension(const std::string& path);
 
-/// Writes linear RGB (3 channels) in the format given by the extension; PNG for unknown ones.
-///   .exr               32-bit floats, with `place` and `attributes`
-///   .pfm .tif .tiff    32-bit floats
-///   .hdr               8 bits per channel and a shared exponent; negative values and NaN become 0
-///   .png .jpg .jpeg    8-bit sRGB, values clamped to [0, 1], NaN becomes black
+/// Writes linear RGB (3 channels), multiplied by `alpha` (1 channel) if there is one, in the format given by the
+/// extension; PNG for unknown ones. All but EXR hold the frame.
+///   .exr               32-bit floats, with `place`, `attributes` and alpha
+///   .tif .tiff         32-bit floats, with alpha
+///   .pfm               32-bit floats, on black
+///   .hdr               8 bits per channel and a shared exponent, on black; negative values and NaN become 0
+///   .png               8-bit sRGB, values clamped to [0, 1], NaN becomes black; colours are divided by alpha first
+///   .jpg .jpeg         the same on black, without alpha
 /// Throws Error(kIo).
 void write_image(const std::string& path, const Image& linear, const ImagePlace& place,
-                 const std::map<std::string, std::string>& attributes);
+                 const std::map<std::string, std::string>& attributes, const Image& alpha = {});
 
-/// Writes linear RGB as 8-bit sRGB, values clamped to [0, 1], NaN as black. The text chunk `Software` identifies
-/// covary. Throws Error(kIo).
-void write_png(const std::string& path, const Image& linear);
+/// The pixels of the frame of an image with any number of channels: 0 where the image has none.
+Image framed(const Image& image, const ImagePlace& place);
+
+/// Writes linear RGB, multiplied by `alpha` if there is one, as 8-bit sRGB, values clamped to [0, 1], NaN as black. The
+/// text chunk `Software` identifies covary. Throws Error(kIo).
+void write_png(const std::string& path, const Image& linear, const Image& alpha = {});
 
 /// Whether the file is a PNG written by write_png().
 bool is_own_png(const std::string& path);

@@ -7,8 +7,10 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 
 #include "core/error.h"
+#include "film/image_file.h"
 #include "film/image_writer.h"
 #include "film/output_file.h"
 
@@ -47,7 +49,38 @@ void check_extension(const std::string& option, const std::string& path, OutputK
   }
 }
 
+/// Whether the bytes of `text` are somewhere in the file.
+bool holds(const std::string& path, std::string_view text) {
+  std::ifstream file(path, std::ios::binary);
+  std::string block;
+  for (std::vector<char> next(size_t{1} << 20); file;) {
+    file.read(next.data(), static_cast<std::streamsize>(next.size()));
+    block.append(next.data(), static_cast<size_t>(file.gcount()));
+    if (block.find(text) != std::string::npos) return true;
+    block.erase(0, block.size() - std::min(block.size(), text.size()));
+  }
+  return false;
+}
+
 }  // namespace
+
+bool is_made_by(const std::string& path, const std::string& command) {
+  std::error_code ignored;
+  if (fs::is_regular_file(path, ignored) && fs::file_size(path, ignored) == 0) return true;
+  if (ends_in(path, {".png"})) return is_own_png(path);
+  if (ends_in(path, {".mp4", ".mkv", ".mov", ".webm"})) return holds(path, kMadeByCovary);
+  try {
+    const std::map<std::string, std::string> attributes = inspect_image(path, ChecksumPolicy::kIgnore).attributes;
+    const auto text = [&](const char* key) {
+      const auto found = attributes.find(key);
+      return found == attributes.end() ? std::string() : found->second;
+    };
+    return is_exr_image(path) ? text("covary:command").starts_with("covary " + command + " ")
+                              : text("Software") == "covary";
+  } catch (const Error&) {
+    return false;  // damaged, or something else under this name
+  }
+}
 
 bool Outputs::identify(const std::string& path, Identity& identity) {
   struct stat status {};
@@ -90,6 +123,18 @@ void Outputs::writes(const std::string& option, const std::string& path, OutputK
     if (output.identity == entry.identity)
       usage(fmt::format("{} '{}' and {} '{}' are the same file", output.option, output.path, option, path));
   outputs_.push_back(entry);
+}
+
+void Outputs::writes_result(const std::string& option, const std::string& path, OutputKind kind,
+                            const std::string& command, bool overwrite) {
+  writes(option, path, kind);
+  std::error_code ignored;
+  if (overwrite || !fs::is_regular_file(path, ignored) || output_target(path).is_special || is_made_by(path, command))
+    return;
+  usage(
+      fmt::format("{} '{}' already exists, and 'covary {}' did not make it; give another name, or --overwrite to "
+                  "replace it",
+                  option, path, command));
 }
 
 void Outputs::writes_derived_png(const std::string& option, const std::string& path, const std::string& remedy) {

@@ -29,6 +29,10 @@ class Outputs {
   /// A file that the command writes; `option` ("-o", "the preview") names it in messages. Throws Error(kIo) if it
   /// cannot be written.
   void writes(const std::string& option, const std::string& path, OutputKind kind);
+  /// Same for the result of `command` ("denoise"): an existing file is replaced only if the same command made it
+  /// (is_made_by), or if `overwrite` is set.
+  void writes_result(const std::string& option, const std::string& path, OutputKind kind, const std::string& command,
+                     bool overwrite);
   /// A picture (PNG) whose name was derived from another one: it may replace only what covary made. `remedy` says what
   /// to do instead: "use --no-preview".
   void writes_derived_png(const std::string& option, const std::string& path, const std::string& remedy);
@@ -50,6 +54,14 @@ class Outputs {
 
   std::vector<Entry> inputs_, outputs_;
 };
+
+/// Whether "covary `command` …" made the file, so that it can make it again: according to the attribute covary:command of
+/// EXR files; of PNG, JPEG, TIFF and videos only known is that covary did. Other formats, such as HDR and PFM, do not
+/// tell: false. Empty files are nobody's: true.
+bool is_made_by(const std::string& path, const std::string& command);
+
+/// Text in videos of covary.
+inline constexpr const char* kMadeByCovary = "made by covary convert";
 
 /// Whether both paths lead to the same existing file, through any links.
 bool is_same_file(const std::string& a, const std::string& b);

@@ -123,6 +123,34 @@ TEST(Outputs, DerivedPicturesReplaceOnlyOnesOfOurs) {
   EXPECT_TRUE(contains(message(), "the preview would replace"));
 }
 
+TEST(Outputs, ResultsReplaceOnlyThoseOfTheirCommand) {
+  const std::string exr = test_file("a.exr"), png = test_file("a.png"), video = test_file("a.mp4"),
+                    tif = test_file("a.tif"), pfm = test_file("a.pfm");
+  const Image image(2, 2, 3);
+  const ImagePlace place{2, 2, {0, 0, 2, 2}};
+  write_image(exr, image, place, {{"covary:command", "covary merge a.exr b.exr -o c.exr"}});
+  for (const std::string& path : {png, tif, pfm}) write_image(path, image, place, {});
+  write_text_file(video, std::string(1048570, 'x') + kMadeByCovary + "…");  // across two blocks of the search
+  EXPECT_TRUE(is_made_by(exr, "merge"));
+  EXPECT_FALSE(is_made_by(exr, "mer"));
+  for (const std::string& path : {png, tif, video}) EXPECT_TRUE(is_made_by(path, "convert")) << path;
+  EXPECT_FALSE(is_made_by(pfm, "convert"));  // the format has no place to say it
+  Outputs outputs;
+  EXPECT_EQ(
+      message_of([&] { outputs.writes_result("-o", exr, OutputKind::kFilm, "denoise", false); }, ErrorCode::kUsage),
+      "-o '" + exr +
+          "' already exists, and 'covary denoise' did not make it; give another name, or --overwrite "
+          "to replace it");
+  Outputs().writes_result("-o", exr, OutputKind::kFilm, "denoise", true);
+  Outputs().writes_result("-o", exr, OutputKind::kFilm, "merge", false);
+  Outputs().writes_result("-o", test_file("new.exr"), OutputKind::kFilm, "denoise", false);
+  Outputs().writes_result("-o", "/dev/null", OutputKind::kFilm, "denoise", false);
+  write_text_file(video, "a film of holidays");
+  EXPECT_FALSE(is_made_by(video, "convert"));
+  write_text_file(exr, "damaged");
+  EXPECT_FALSE(is_made_by(exr, "merge"));
+}
+
 TEST(Outputs, SameFiles) {
   const std::string path = test_file("a.exr"), link = test_file("link.exr"), copy = test_file("copy.exr");
   write_text_file(path, "film");

@@ -25,6 +25,7 @@ struct ImageHeader {
   std::vector<std::string> channels;
   int alpha_channel = -1;                         ///< index into `channels`; -1: none
   int n_picture = 0;                              ///< the first so many channels are the picture (EXR); 0: unknown
+  bool straight_alpha = false;                    ///< colours are not multiplied by alpha
   std::map<std::string, std::string> attributes;  ///< those whose values are text
 };
 
@@ -75,7 +76,7 @@ enum class OtherColours { kConvert, kKeep };
 /// image, is damaged, empty, a volume or deep, or claims more pixels than a file of its size can hold.
 std::unique_ptr<ImageReader> open_image(const std::string& path, OtherColours colours = OtherColours::kConvert);
 
-/// Pixels to write: `channels` (1: grey, 3: RGB) interleaved values per pixel, row by row from the top. Exactly one of
+/// Pixels to write: `channels` (1: grey, 3: RGB, 4: RGB multiplied by alpha, and alpha) interleaved values per pixel, row by row from the top. Exactly one of
 /// `bytes` and `floats` is set; neither is owned.
 struct ImageToEncode {
   int width = 0, height = 0, channels = 3;

@@ -44,6 +44,7 @@ class OiioReader final : public ImageReader {
     header_.floating_point = spec.format.is_floating_point();
     header_.channels.assign(spec.channelnames.begin(), spec.channelnames.end());
     header_.alpha_channel = spec.alpha_channel;
+    header_.straight_alpha = spec.get_int_attribute("oiio:UnassociatedAlpha") != 0;
     has_rows_ = spec.tile_width == 0;
     for (const OIIO::ParamValue& value : spec.extra_attribs) {
       if (value.name() == "compression") header_.compression = value.get_string();

@@ -34,7 +34,7 @@ class PlainReader final : public ImageReader {
     header_.type = header_.floating_point ? "float" : rows->bytes_per_value == 2 ? "uint16" : "uint8";
     header_.channels = rows->channels < 3 ? std::vector<std::string>{"Y"} : std::vector<std::string>{"R", "G", "B"};
     if (rows->channels % 2 == 0) {
-      header_.alpha_channel = rows->channels - 1;
+      header_.alpha_channel = rows->channels - 1, header_.straight_alpha = true;  // of the formats here, PNG alone
       header_.channels.emplace_back("A");
     }
   }

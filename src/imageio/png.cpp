@@ -79,14 +79,17 @@ std::unique_ptr<ImageReader> open_plain_png(const std::string& path) {
   return open_plain_rows(path, "png", [](std::FILE* file) { return std::make_unique<PngRows>(file); });
 }
 
-std::vector<unsigned char> encode_png(int width, int height, const std::vector<uint8_t>& rgb,
+std::vector<unsigned char> encode_png(int width, int height, const std::vector<uint8_t>& pixels,
                                       const std::map<std::string, std::string>& texts) {
-  COVARY_CHECK(width > 0 && height > 0 && rgb.size() == size_t{3} * width * height, "three bytes a pixel");
+  const size_t n_pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
+  const bool has_alpha = pixels.size() == 4 * n_pixels;
+  COVARY_CHECK(width > 0 && height > 0 && (has_alpha || pixels.size() == 3 * n_pixels), "three or four bytes a pixel");
   std::vector<unsigned char> content;
   const Writer writer;
   png_set_write_fn(writer.png, &content, append, no_flush);
   png_set_IHDR(writer.png, writer.info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), 8,
-               PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+               has_alpha ? PNG_COLOR_TYPE_RGB_ALPHA : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_set_sRGB(writer.png, writer.info, PNG_sRGB_INTENT_PERCEPTUAL);
   for (const auto& [key, value] : texts) {
     std::string keyword = key, text = value;  // libpng takes non-const text
@@ -96,7 +99,7 @@ std::vector<unsigned char> encode_png(int width, int height, const std::vector<u
     png_set_text(writer.png, writer.info, &chunk, 1);  // copies
   }
   png_write_info(writer.png, writer.info);
-  for (int y = 0; y < height; ++y) png_write_row(writer.png, rgb.data() + size_t{3} * width * y);
+  for (int y = 0; y < height; ++y) png_write_row(writer.png, pixels.data() + (has_alpha ? size_t{4} : 3) * width * y);
   png_write_end(writer.png, nullptr);
   return content;
 }

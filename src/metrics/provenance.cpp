@@ -52,6 +52,13 @@ std::set<std::string> seeds_of(const ImageFacts& image) {
 /// Samples per pixel; 0 if the file does not say.
 double samples_of(const ImageFacts& image) { return std::strtod(attribute(image, "samples", "0").c_str(), nullptr); }
 
+/// Of the picture.
+ColourSpace colours_of(const ImageFacts& image) {
+  const std::vector<ColourLayer> layers = colour_layers(image.info.channels);
+  const ColourLayer* picture = find_picture(layers);
+  return picture ? layer_colours(image.info.colours, picture->channels) : image.info.colours;
+}
+
 bool is_integer(const ImageFacts& image) {
   const auto& channels = image.info.channels;
   return image.info.format != "openexr" && std::any_of(channels.begin(), channels.end(), [](const ExrFile::Channel& c) {
@@ -61,12 +68,37 @@ bool is_integer(const ImageFacts& image) {
 
 }  // namespace
 
-std::map<std::string, std::string> inherited_attributes(const std::map<std::string, std::string>& attributes) {
-  static const std::set<std::string> of_films = {"covary:film", "covary:groups", kChecksums};
+std::map<std::string, std::string> inherited_attributes(std::span<const std::map<std::string, std::string>> files) {
+  static const std::set<std::string> of_samples = {"seed",     "sampling",   "scene_hash", "settings",     "samples",
+                                                   "training", "light_film", "exposure",   "clean_guides", "complete"};
   std::map<std::string, std::string> result;
-  for (const auto& [name, value] : attributes)
-    if (name.starts_with(kPrefix) && !of_films.count(name)) result[name] = value;
+  if (files.empty()) return result;
+  for (const auto& [name, value] : files[0]) {
+    if (!name.starts_with(kPrefix) || !of_samples.count(name.substr(std::string_view(kPrefix).size()))) continue;
+    const bool agree = std::all_of(files.begin(), files.end(), [&name = name, &value = value](const auto& file) {
+      const auto found = file.find(name);
+      return found != file.end() && found->second == value;
+    });
+    if (agree) result[name] = value;
+  }
+  const std::string seed = std::string(kPrefix) + film_key::kSeed;
+  std::set<std::pair<size_t, std::string>> seeds;  // by length first, which orders numbers
+  for (const auto& file : files) {
+    const auto found = file.find(seed);
+    if (found == file.end()) return result;
+    std::stringstream words(found->second);
+    for (std::string word; std::getline(words, word, ',');) seeds.insert({word.size(), word});
+  }
+  std::string joined;
+  for (const auto& [size, word] : seeds) joined += (joined.empty() ? "" : ",") + word;
+  result[seed] = joined;
   return result;
+}
+
+std::map<std::string, std::string> inherited_attributes(std::span<const std::string> paths) {
+  std::vector<std::map<std::string, std::string>> files;
+  for (const std::string& path : paths) files.push_back(inspect_image(path).attributes);
+  return inherited_attributes(files);
 }
 
 ImageFacts read_facts(const std::string& path, const std::string& name) {
@@ -131,6 +163,9 @@ std::vector<std::string> comparison_warnings(const ImageFacts& image, const Imag
   // An exposure of 0 is not stored.
   compare("have different exposures in stops", attribute(image, "exposure", "0"),
           attribute(reference, "exposure", "0"));
+  if (const ColourSpace own = colours_of(image), other_space = colours_of(reference); !(own == other_space))
+    warn(fmt::format("have different colour spaces, {} and {}; they are converted to one", own.text(),
+                     other_space.text()));
   if (is_integer(image) != is_integer(reference)) {
     const ImageFacts& rounded = is_integer(image) ? image : reference;
     warn(fmt::format("differ in precision: {} holds {} values, rounded and cut off at white", rounded.name,

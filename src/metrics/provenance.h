@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -13,8 +14,12 @@ namespace covary {
 /// Attribute: exposure in stops applied by `covary convert --exposure`.
 inline constexpr const char* kExposureAttribute = "covary:exposure";
 
-/// covary's attributes that remain true for an image derived from this one; those specific to films are dropped.
-std::map<std::string, std::string> inherited_attributes(const std::map<std::string, std::string>& attributes);
+/// covary's attributes that remain true for an image derived from those of all these files: what rendered their samples.
+/// Seeds are joined; others that differ, and those that describe the old image (its error, its estimator, its place in
+/// a film), are dropped.
+std::map<std::string, std::string> inherited_attributes(std::span<const std::map<std::string, std::string>> files);
+/// Of files; those that are not EXR have none.
+std::map<std::string, std::string> inherited_attributes(std::span<const std::string> paths);
 
 struct ImageFacts {
   std::string path, name;  ///< `name` is used in messages

@@ -82,11 +82,25 @@ TEST(Provenance, OneFileAsBoth) {
 }
 
 TEST(Provenance, ImagesOfFilmsAreNoFilms) {
-  const std::map<std::string, std::string> attributes = {{"covary:film", "1"},     {"covary:groups", "2"},
-                                                         {"covary:checksums", ""}, {"covary:seed", "1"},
-                                                         {"covary:samples", "4"},  {"owner", "somebody"}};
-  EXPECT_EQ(inherited_attributes(attributes),
+  const std::vector<std::map<std::string, std::string>> one = {{{"covary:film", "1"},
+                                                                {"covary:groups", "2"},
+                                                                {"covary:checksums", ""},
+                                                                {"covary:seed", "1"},
+                                                                {"covary:samples", "4"},
+                                                                {"covary:predicted_relmse", "0.1"},
+                                                                {"covary:denoiser", "x"},
+                                                                {"covary:frame", "y"},
+                                                                {"owner", "somebody"}}};
+  EXPECT_EQ(inherited_attributes(one),
             (std::map<std::string, std::string>{{"covary:seed", "1"}, {"covary:samples", "4"}}));
+}
+
+TEST(Provenance, ImagesOfSeveralFilesInheritWhatAllSay) {
+  const std::vector<std::map<std::string, std::string>> files = {
+      {{"covary:seed", "10,2"}, {"covary:settings", "path"}, {"covary:samples", "4"}, {"covary:scene_hash", "a"}},
+      {{"covary:seed", "9"}, {"covary:settings", "path"}, {"covary:samples", "8"}}};
+  EXPECT_EQ(inherited_attributes(files),
+            (std::map<std::string, std::string>{{"covary:seed", "2,9,10"}, {"covary:settings", "path"}}));
 }
 
 }  // namespace

@@ -102,7 +102,7 @@ inline void declare(Settings& s, RenderRequest& r) {
   s.one_of("rfilter", filter, {"box", "tent", "gaussian"}, "Reconstruction filter instead of the scene's");
   if (!filter.empty()) r.filter = filter_named(filter);
   s.group("Output");
-  s.flag("overwrite", r.overwrite, "Replace existing films, in `passes` or of an interrupted render");
+  s.flag("overwrite", r.overwrite, "Replace existing films, and an `output` that another command made");
   s.real("checkpoint", r.checkpoint_seconds, {.low = 0}, "Seconds between saving unfinished films; 0: never");
   r.preview = !s.flag("no-preview", "Do not write the PNG");
   s.flag("aovs", r.aovs, "Add the images Albedo, N (normal) and P (position) to the output");

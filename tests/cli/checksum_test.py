@@ -22,7 +22,7 @@ class Checksums(CliTest):
         for seed, name in ((1, "a.exr"), (2, "b.exr"), (3, "c.exr")):
             self.write(name, film(seed, groups=3, size=(5, 4), samples=6, value=0.5 * seed))
         self.good("merge", "a.exr", "b.exr", "-o", "film.exr")
-        self.good("convert", "film.exr", "image.exr")
+        self.good("convert", "film.exr", "image.exr", "-e", "1")  # no film any more
 
     def changed(self, name, channel="R", by=1):
         """The file with one value of a channel changed, as another program writes it: it keeps all attributes."""
@@ -68,7 +68,8 @@ class Checksums(CliTest):
         self.bad(1, message, "merge", name, "c.exr", "-o", "o.exr")
         self.bad(1, message, "combine", "--crn", name, "--independent", "c.exr", "-o", "o.exr")
         self.bad(1, message, "convert", name, "o.exr", "--layer", "group01")
-        self.good("convert", name, "o.exr")  # R G B are as they were
+        self.good("convert", name, "o.png")  # R G B are as they were
+        self.bad(1, message, "convert", name, "o.exr")  # which copies all channels
         name = self.changed("film.exr", "samples")
         self.bad(1, "changed.exr: the channel samples is one with", "merge", name, "c.exr", "-o", "o.exr")
         self.bad(1, "changed.exr: the channel samples is one with", "combine", "--crn", name, "--independent", "c.exr",

@@ -259,7 +259,7 @@ class Merge(CliTest):
             # The thread sanitizer writes a file of its own before the program can ignore the signal: it inherits that
             # then.
             self.bad(1, "cannot write o.exr: File too large", "merge", "a.exr", "b.exr", "-o", "o.exr",
-                     restore_signals=os.environ.get("SANITIZED") != "tsan",
+                     "--overwrite", restore_signals=os.environ.get("SANITIZED") != "tsan",
                      preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
         self.assertEqual(sorted(p.name for p in self.path.iterdir()), ["a.exr", "b.exr", "o.exr"])
 

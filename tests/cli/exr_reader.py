@@ -17,7 +17,7 @@ def header(data):
         end = data.index(b"\0", at)
         kind_end = data.index(b"\0", end + 1)
         size, = struct.unpack_from("<i", data, kind_end + 1)
-        attributes[data[at:end].decode()] = data[kind_end + 5:kind_end + 5 + size]
+        attributes[data[at:end].decode(errors="replace")] = data[kind_end + 5:kind_end + 5 + size]
         at = kind_end + 5 + size
     return attributes, at + 1
 

@@ -14,9 +14,15 @@ def box(x, y, width, height):
     return struct.pack("<4i", x, y, x + width - 1, y + height - 1)
 
 
-def exr(channels, frame, window=None, attributes=None, types=None):
+def chromaticities(*values):
+    """Red x, y, green x, y, blue x, y, white x, y."""
+    return attribute("chromaticities", "chromaticities", struct.pack("<8f", *values))
+
+
+def exr(channels, frame, window=None, attributes=None, types=None, more=b""):
     """The bytes of a file. `channels`: name -> values, row by row; `frame`: (width, height); `window`: (x, y, width,
-    height); `attributes`: name -> text; `types`: name -> pixel type, FLOAT where not given."""
+    height); `attributes`: name -> text; `types`: name -> pixel type, FLOAT where not given; `more`: bytes of further
+    attributes."""
     window = window or (0, 0) + tuple(frame)
     types = types or {}
     x0, y0, width, height = window
@@ -31,7 +37,7 @@ def exr(channels, frame, window=None, attributes=None, types=None):
         attribute("pixelAspectRatio", "float", struct.pack("<f", 1)),
         attribute("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0)),
         attribute("screenWindowWidth", "float", struct.pack("<f", 1)),
-    ] + [attribute(n, "string", t.encode()) for n, t in (attributes or {}).items()]) + b"\0"
+    ] + [attribute(n, "string", t.encode()) for n, t in (attributes or {}).items()] + [more]) + b"\0"
     head = struct.pack("<ii", 20000630, 2) + head
     form = {UINT: "I", HALF: "e", FLOAT: "f"}
     rows = []

@@ -93,7 +93,7 @@ class Video(CliTest):
         arguments, frames = (self.path / "v.mp4").read_bytes().split(b"\n", 1)
         self.assertIn(b"-video_size 4x3 -framerate 12", arguments)
         self.assertEqual(frames, bytes(36) + b"\xff" * 72)
-        result = self.convert("f_##.exr", "f_##.exr", "v.mp4", "--overwrite")
+        result = self.convert("f_##.exr", "f_##.exr", "v.mp4")  # its own is replaced
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn(b"-video_size 8x3 -framerate 24", (self.path / "v.mp4").read_bytes())
 

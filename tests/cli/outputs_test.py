@@ -78,8 +78,8 @@ class Overwriting(OutputsTest):
         self.write("old.hdr", b"#?RADIANCE")
         for names in (("a.exr", "b.exr"), ("a.exr", "pt.exr", "b.exr"), ("a.exr", "photograph.png"),
                       ("a.exr", "old.hdr")):
-            self.bad(2, f"the output '{names[-1]}', which is the last name given, already exists and not a picture "
-                     "that 'covary convert' made; give another name, or --overwrite", "convert", *names)
+            self.bad(2, f"the output '{names[-1]}' already exists, and 'covary convert' did not make it; give another "
+                     "name, or --overwrite to replace it", "convert", *names)
         self.assertEqual((self.path / "b.exr").read_bytes(), before)
         for name in ("new.exr", "new.png"):
             self.good("convert", "a.exr", name)
@@ -87,11 +87,26 @@ class Overwriting(OutputsTest):
         self.good("convert", "--overwrite", "a.exr", "b.exr")
         self.assertNotEqual((self.path / "b.exr").read_bytes(), before)
 
+    def test_results_replace_only_those_of_the_same_command(self):
+        self.write("third.exr", film(4, groups=3, sampling="independent", command="covary render x.xml -o third.exr"))
+        before = (self.path / "third.exr").read_bytes()
+        merge = ("merge", "a.exr", "b.exr")
+        combine = ("combine", "--crn", "a.exr", "--independent", "pt.exr", "--force", "--quiet")
+        for command in (merge, combine, ("denoise", "a.exr", "b.exr", "--oidn", "off"), ("denoise", "a.exr")):
+            self.bad(2, f"-o 'third.exr' already exists, and 'covary {command[0]}' did not make it; give another name, "
+                     "or --overwrite to replace it", *command, "-o", "third.exr")
+        self.assertEqual((self.path / "third.exr").read_bytes(), before)
+        for command in (merge, combine):
+            self.good(*command, "-o", "o.exr", "--overwrite")
+            self.good(*command, "-o", "o.exr")  # its own
+        self.write("empty.exr", b"")  # as mktemp leaves it
+        self.good(*merge, "-o", "empty.exr")
+
     def test_write_protected_files_stay(self):
         self.write("o.exr", b"kept")
         (self.path / "o.exr").chmod(0o444)
         message = "cannot write o.exr: the file there is write-protected"
-        self.bad(1, message, "merge", "a.exr", "b.exr", "-o", "o.exr")
+        self.bad(1, message, "merge", "a.exr", "b.exr", "-o", "o.exr", "--overwrite")
         self.bad(1, message, "convert", "--overwrite", "a.exr", "o.exr")
         self.bad(1, message, "combine", "--crn", "a.exr", "--independent", "pt.exr", "-o", "o.exr")
         self.assertEqual((self.path / "o.exr").read_bytes(), b"kept")
@@ -142,7 +157,10 @@ class Formats(OutputsTest):
         self.assertEqual(read_exr((self.path / "o.exr").read_bytes())["G"], values)
         info = json.loads(self.good("info", "o.exr", "--json").stdout)
         self.assertEqual(info["attributes"]["covary:seed"], "3")
-        self.assertNotIn("covary:film", info["attributes"], "R G B alone are no film")
+        self.assertEqual(info["attributes"]["covary:film"], "1", "with all channels, a film remains one")
+        self.good("convert", "a.exr", "o.exr", "-e", "1")
+        info = json.loads(self.good("info", "o.exr", "--json").stdout)
+        self.assertNotIn("covary:film", info["attributes"])
 
     def test_exr_keeps_window_and_exposure(self):
         self.image("crop.exr", (1, 2, 3), size=(10, 8), window=(3, 2, 4, 5))
