@@ -42,7 +42,7 @@ constexpr const char* kNetwork = "oidn";
 
 struct Options {
   std::vector<std::string> inputs;
-  std::string output, mode, oidn, albedo, normal;
+  std::string output, layer, mode, oidn, albedo, normal;
   std::vector<std::string> layers;
   bool no_guides = false, clean_guides = false, check = false, quiet = false, force = false, overwrite = false;
   FrameOptions of_frames;
@@ -76,9 +76,9 @@ class GuideLayers {
     if (o.no_guides) return;
     for (const std::string& path : o.inputs) {
       const ImageInfo info = inspect_image(path);
-      add(path, guide(path, info, o.albedo, GuideKind::kAlbedo), albedo, n_albedo_);
-      add(path, guide(path, info, o.normal, GuideKind::kNormal), normal, n_normal_);
-      add(path, find_guide(path, info, GuideKind::kPosition), position, n_position_);
+      add(path, guide(path, info, o, o.albedo, GuideKind::kAlbedo), albedo, n_albedo_);
+      add(path, guide(path, info, o, o.normal, GuideKind::kNormal), normal, n_normal_);
+      add(path, find_guide(path, info, GuideKind::kPosition, o.layer), position, n_position_);
     }
     divide(albedo, n_albedo_);
     divide(normal, n_normal_);
@@ -94,9 +94,9 @@ class GuideLayers {
   }
 
  private:
-  static std::optional<Image> guide(const std::string& path, const ImageInfo& info, const std::string& name,
-                                    GuideKind kind) {
-    if (name.empty()) return find_guide(path, info, kind);
+  static std::optional<Image> guide(const std::string& path, const ImageInfo& info, const Options& o,
+                                    const std::string& name, GuideKind kind) {
+    if (name.empty()) return find_guide(path, info, kind, o.layer);
     return named_guide(path, info, name);
   }
 
@@ -135,7 +135,7 @@ void denoise_by_network(const Options& o, const GuideLayers& guides, ProgressLin
   const ImageInfo info = inspect_image(input);
   constexpr double kImages = 4 * 3 * sizeof(float), kNetworkBytes = 600;  // per pixel: image, guides and result
   require_image_memory(input, info.place.window.width, info.place.window.height, kImages + kNetworkBytes);
-  const PlacedImage image = read_image(input, "", ChecksumPolicy::kCheck, std::nullopt);
+  const PlacedImage image = read_image(input, o.layer, ChecksumPolicy::kCheck, std::nullopt);
   warn_of_values(input, image.image);
   if (const std::string by = denoised_by(info.attributes, info.channels); !by.empty())
     fmt::print(stderr, "warning: {} is denoised already ({}); give the render before denoising\n", input, by);
@@ -151,7 +151,7 @@ void denoise_by_network(const Options& o, const GuideLayers& guides, ProgressLin
   attributes["covary:version"] = COVARY_VERSION;
   attributes["covary:command"] = command_line();
   attributes["covary:denoiser"] = "Open Image Denoise " + denoiser_info(o.denoiser()).version;
-  const std::vector<std::string> picture = layer_channels(input, info.channels, "");
+  const std::vector<std::string> picture = layer_channels(input, info.channels, o.layer);
   EstimatorResult denoised;
   denoised.estimate = std::move(result);
   write(o, image.place, attributes, denoised, {}, {o.inputs, {picture[0], picture[1], picture[2]}, {}}, progress);
@@ -219,7 +219,7 @@ void run_one(const Options& o) {
   progress.begin("loading");
   const GuideLayers guides(o);
   std::optional<GroupedFile> file;
-  if (!is_by_network(o)) file.emplace(o.inputs);
+  if (!is_by_network(o)) file.emplace(o.inputs, o.layer);
   if (file && file->groups() < 2 && !o.mode.empty())
     throw Error(ErrorCode::kUsage, fmt::format("--mode {} needs a second render of another seed, or a film with two "
                                                "groups or more (--groups); '{}' has one",
@@ -242,7 +242,7 @@ void run_sequence(const Options& o, const FramePatterns& patterns) {
 
 void run(const Options& o) {
   if (o.check) return check(o);
-  const FramePatterns patterns{o.inputs, {}, o.output, ""};
+  const FramePatterns patterns{o.inputs, {}, o.output, o.layer};
   are_frames(o.of_frames, patterns) ? run_sequence(o, patterns) : run_one(o);
 }
 
@@ -256,6 +256,8 @@ void add_denoise(CLI::App& app) {
             "renders that differ only in their seed, or a film with groups, give a better image and its error")
       ->expected(1, 1000);
   add_value(*command, "-o,--output", o->output, kFileValue, "The result (EXR)");
+  add_value(*command, "--layer", o->layer, "LAYER",
+            "Layer of the picture, e.g. a view or a view layer, if the files hold several");
   std::vector<std::string> modes = {kNetwork};
   modes.insert(modes.end(), denoise_mode_names().begin() + 1, denoise_mode_names().end());
   command

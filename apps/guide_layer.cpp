@@ -49,6 +49,17 @@ bool has_three_channels(const ImageInfo& info, const std::string& layer) {
          }) == 3;
 }
 
+/// Whether the layer may show the same view as the picture: "left.N" and "N", but not "right.N", for "left"; and
+/// "ViewLayer.Normal" for "ViewLayer.Combined".
+bool is_of(const std::string& picture, const std::string& layer) {
+  const auto folder = [](const std::string& name) {
+    const size_t dot = name.rfind('.');
+    return dot == std::string::npos ? std::string() : name.substr(0, dot);
+  };
+  const std::string of_layer = folder(layer);
+  return of_layer.empty() || of_layer == picture || of_layer == folder(picture);
+}
+
 Image checked_guide(const std::string& path, const std::string& layer) {
   Image guide = read_image(path, layer, ChecksumPolicy::kCheck, std::nullopt).image;
   check_guide(path + (layer.empty() ? "" : ": the layer " + layer), guide);
@@ -57,7 +68,7 @@ Image checked_guide(const std::string& path, const std::string& layer) {
 
 /// The pixels of the image at `path` in a separate file.
 Image guide_from_file(const std::string& path, const ImagePlace& place, const std::string& file) {
-  PlacedImage guide = read_image(file);
+  PlacedImage guide = read_image(file, "", ChecksumPolicy::kCheck, std::nullopt);
   const CropWindow common = common_window(path, place, place.window, file, guide.place);
   if (!(common == place.window))
     throw Error(ErrorCode::kInput, fmt::format("'{}' has the pixels {}; '{}' needs {}", file,
@@ -69,8 +80,10 @@ Image guide_from_file(const std::string& path, const ImagePlace& place, const st
 
 }  // namespace
 
-std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, GuideKind kind) {
-  const std::vector<std::string> layers = image_layers(info.channels);
+std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, GuideKind kind,
+                                const std::string& picture) {
+  std::vector<std::string> layers = image_layers(info.channels);
+  if (!picture.empty()) std::erase_if(layers, [&](const std::string& layer) { return !is_of(picture, layer); });
   const std::span<const std::string_view> all[] = {kAlbedo, kNormal, kPosition};
   for (const std::string_view name : all[static_cast<int>(kind)])
     for (const std::string& layer : layers)

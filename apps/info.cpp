@@ -35,6 +35,7 @@ void print_json(const ImageInfo& info, const std::string& path) {
   object["frame"] = {info.place.frame_width, info.place.frame_height};
   object["window"] = {w.x, w.y, w.width, w.height};
   object["compression"] = info.compression;
+  object["colours"] = info.colours.text();
   for (const ExrFile::Channel& c : info.channels) object["channels"][c.name] = c.type;
   object["attributes"] = info.attributes;
   write_text_output("-", json_text(object, -1));
@@ -95,6 +96,7 @@ void print_text(const ImageInfo& info, const std::string& path) {
   if (w.x || w.y || w.width != info.place.frame_width || w.height != info.place.frame_height)
     fmt::print(" at ({}, {}) of a frame of {} x {}", w.x, w.y, info.place.frame_width, info.place.frame_height);
   fmt::print(", {}{}{}\n", info.format, info.compression.empty() ? "" : ", compression ", info.compression);
+  if (!(info.colours == ColourSpace::rec709())) fmt::print("colours {}\n", info.colours.text());
   fmt::print("channels\n{}", describe_channels(info.channels));
   if (!info.attributes.empty()) fmt::print("attributes\n");
   for (const auto& [name, value] : info.attributes) fmt::print("  {}: {}\n", name, value);

@@ -56,6 +56,14 @@ class DependentTests(RenderTest):
                   *METHOD, "--quiet", "--save-stages", "again")
         self.same("again/filtered.exr", "steps/filtered.exr")
 
+    def test_stages_of_an_image_that_missed_its_target(self):
+        result = self.run_covary("render", ROOM, *SMALL, "-o", "a.exr", *METHOD, "--relative-error", "1e-9",
+                                 "--max-spp", "24", "--save-stages", "steps")
+        self.assertEqual(result.returncode, 3, result.stderr)
+        self.assertEqual(sorted(p.name for p in (self.path / "steps").iterdir()),
+                         sorted(f"{name}.{end}" for name in STAGES for end in ("exr", "png")))
+        self.same("steps/combined.exr", "a.exr")
+
     def test_interrupted_and_resumed(self):
         arguments = ("render", ROOM, "--resolution", "160x120", "--quiet", "--no-preview", *METHOD, "--spp", "64",
                      "--seed", "4")

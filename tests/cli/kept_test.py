@@ -99,6 +99,21 @@ class Results(KeptTest):
             self.assertNotEqual(attributes.get("covary:predicted_relmse"), b"123", "it describes the old image")
             self.assertIn(ACES_CG.split(b"\0", 2)[2][4:], attributes["chromaticities"])
 
+    def test_one_of_two_views(self):
+        views = []
+        for seed, name in ((1, "a.exr"), (2, "b.exr")):
+            chance = random.Random(seed)
+            views.append({f"{view}.{c}": floats(chance.expovariate(1) for _ in range(N)) for view in ("left", "right")
+                          for c in "RGB"})
+            self.write(name, exr(views[-1], SIZE, attributes={"owner": "somebody"}))
+        self.bad(1, "several images; name one by its layer; images in it: 'left', 'right'", "denoise", "a.exr", "b.exr",
+                 "--oidn", "off", "-o", "o.exr")
+        self.good("denoise", "a.exr", "b.exr", "--layer", "right", "--oidn", "off", "-o", "o.exr")
+        found, attributes = self.read("o.exr")
+        self.assertEqual([c for c in views[0] if found[c] == views[0][c]], ["left.R", "left.G", "left.B"])
+        self.assertLess(max(found["right.G"]), max(views[0]["right.G"]))
+        self.assertEqual(attributes["owner"], b"somebody")
+
     def test_statistics_of_the_samples_go(self):
         self.render("a.exr", 1), self.render("b.exr", 2)
         self.good("denoise", "a.exr", "b.exr", "--oidn", "off", "-o", "ab.exr")
