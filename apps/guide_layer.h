@@ -14,8 +14,8 @@ namespace covary {
 enum class GuideKind { kAlbedo, kNormal, kPosition };
 
 /// The guide layer of the image at `path` by the renderers' names (table in docs/other-renderers.md); if there are
-/// several, the first in the table. `picture`: the picture's layer, to which layers of other views do not belong. Throws
-/// like read_image() and check_guide().
+/// several, the first in the table. `picture`: the picture's layer, to which layers of other views do not belong.
+/// Throws like read_image() and check_guide().
 std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, GuideKind kind,
                                 const std::string& picture = "");
 

@@ -44,6 +44,22 @@ double largest_ratio(const std::string& compression) {
   return 1e5;
 }
 
+/// Throws if the windows are empty or absurdly large.
+ImagePlace place_of(const std::string& path, const Imf::Header& header) {
+  const Imath::Box2i display = header.displayWindow(), window = header.dataWindow();
+  const auto extent = [](int low, int high) { return static_cast<int64_t>(high) - low + 1; };
+  const int64_t width = extent(window.min.x, window.max.x), height = extent(window.min.y, window.max.y);
+  const int64_t frame_width = extent(display.min.x, display.max.x), frame_height = extent(display.min.y, display.max.y);
+  if (std::min({width, height, frame_width, frame_height}) < 1 ||
+      std::max({width, height, frame_width, frame_height}) > kMaxExrSize)
+    fail(path, fmt::format("{} x {} pixels in a frame of {} x {}; expected 1 to {} in each direction", width, height,
+                           frame_width, frame_height, kMaxExrSize));
+  ImagePlace place{static_cast<int>(frame_width), static_cast<int>(frame_height), {}};
+  place.window = {window.min.x - display.min.x, window.min.y - display.min.y, static_cast<int>(width),
+                  static_cast<int>(height)};
+  return place;
+}
+
 /// Of all parts, which share it.
 ColourSpace colour_space_of(const Imf::Header& header, const std::map<std::string, std::string>& attributes) {
   if (Imf::hasChromaticities(header)) {
@@ -144,21 +160,10 @@ ExrFile::ExrFile(const std::string& path, ChecksumPolicy checksums) : path_(path
       if (n_parts == 1) fail(path, "deep EXR files are not supported");
       continue;
     }
-    const Imath::Box2i display = header.displayWindow(), window = header.dataWindow();
-    const auto extent = [](int low, int high) { return static_cast<int64_t>(high) - low + 1; };
-    const int64_t width = extent(window.min.x, window.max.x), height = extent(window.min.y, window.max.y);
-    const int64_t frame_width = extent(display.min.x, display.max.x),
-                  frame_height = extent(display.min.y, display.max.y);
-    if (std::min({width, height, frame_width, frame_height}) < 1 ||
-        std::max({width, height, frame_width, frame_height}) > kMaxExrSize)
-      fail(path, fmt::format("{} x {} pixels in a frame of {} x {}; expected 1 to {} in each direction", width, height,
-                             frame_width, frame_height, kMaxExrSize));
-    ImagePlace place{static_cast<int>(frame_width), static_cast<int>(frame_height), {}};
-    place.window = {window.min.x - display.min.x, window.min.y - display.min.y, static_cast<int>(width),
-                    static_cast<int>(height)};
+    const ImagePlace place = place_of(path, header);
     if (channels_.empty()) {
       place_ = place;
-      handle_->window = window;
+      handle_->window = header.dataWindow();
       compression_ = compression_name(header.compression());
     } else if (!(place == place_)) {
       fail(path, "parts with different windows are not supported");

@@ -50,8 +50,8 @@ void require_image_memory(const std::string& path, int width, int height, double
 
 /// Reads three channels as linear RGB (integer files are decoded from sRGB). `layer` selects the channels: "N" for N.X
 /// N.Y N.Z, "group03" for group03.R/G/B, or the full name of a single channel, returned as grey; "" is the picture
-/// (find_picture), or X Y Z, or Y, or the only layer there is. Colours (holds_colours) are converted to `colours`; none:
-/// as stored. Throws like inspect_image; for an unknown layer, throws Error(kInput) listing the existing ones.
+/// (find_picture), or X Y Z, or Y, or the only layer there is. Colours (holds_colours) are converted to `colours`;
+/// none: as stored. Throws like inspect_image; for an unknown layer, throws Error(kInput) listing the existing ones.
 PlacedImage read_image(const std::string& path, const std::string& layer = "",
                        ChecksumPolicy checksums = ChecksumPolicy::kCheck,
                        const std::optional<ColourSpace>& colours = ColourSpace::rec709());

@@ -55,8 +55,8 @@ class Outputs {
   std::vector<Entry> inputs_, outputs_;
 };
 
-/// Whether "covary `command` …" made the file, so that it can make it again: according to the attribute covary:command of
-/// EXR files; of PNG, JPEG, TIFF and videos only known is that covary did. Other formats, such as HDR and PFM, do not
+/// Whether "covary `command` …" made the file, so that it can make it again: according to the attribute covary:command
+/// of EXR files; of PNG, JPEG, TIFF and videos, only whether covary did. Other formats, such as HDR and PFM, do not
 /// tell: false. Empty files are nobody's: true.
 bool is_made_by(const std::string& path, const std::string& command);
 

@@ -76,8 +76,8 @@ enum class OtherColours { kConvert, kKeep };
 /// image, is damaged, empty, a volume or deep, or claims more pixels than a file of its size can hold.
 std::unique_ptr<ImageReader> open_image(const std::string& path, OtherColours colours = OtherColours::kConvert);
 
-/// Pixels to write: `channels` (1: grey, 3: RGB, 4: RGB multiplied by alpha, and alpha) interleaved values per pixel, row by row from the top. Exactly one of
-/// `bytes` and `floats` is set; neither is owned.
+/// Pixels to write: `channels` (1: grey, 3: RGB, 4: RGB multiplied by alpha, and alpha) interleaved values per pixel,
+/// row by row from the top. Exactly one of `bytes` and `floats` is set; neither is owned.
 struct ImageToEncode {
   int width = 0, height = 0, channels = 3;
   const uint8_t* bytes = nullptr;                 ///< sRGB-encoded

@@ -17,8 +17,8 @@ class ImageReader;
 std::unique_ptr<ImageReader> open_plain_png(const std::string& path);
 
 /// Encodes a PNG file of `width` x `height` pixels, three sRGB-encoded bytes each, or four with alpha (by which the
-/// colours are not multiplied), row by row from the top left. `texts` become text chunks: keywords of 1 to 79 Latin-1 characters, UTF-8 values. Throws Error(kIo) if libpng
-/// refuses the size or a keyword.
+/// colours are not multiplied), row by row from the top left. `texts` become text chunks: keywords of 1 to 79 Latin-1
+/// characters, UTF-8 values. Throws Error(kIo) if libpng refuses the size or a keyword.
 std::vector<unsigned char> encode_png(int width, int height, const std::vector<uint8_t>& pixels,
                                       const std::map<std::string, std::string>& texts = {});
 

@@ -14,7 +14,7 @@ namespace covary {
 /// Attribute: exposure in stops applied by `covary convert --exposure`.
 inline constexpr const char* kExposureAttribute = "covary:exposure";
 
-/// covary's attributes that remain true for an image derived from those of all these files: what rendered their samples.
+/// covary's attributes that remain true for an image made of those of all these files: what rendered their samples.
 /// Seeds are joined; others that differ, and those that describe the old image (its error, its estimator, its place in
 /// a film), are dropped.
 std::map<std::string, std::string> inherited_attributes(std::span<const std::map<std::string, std::string>> files);
