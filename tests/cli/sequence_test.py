@@ -306,7 +306,8 @@ class Denoise(SequenceTest):
         self.assertEqual(wrong.returncode, 1)
         self.assertIn("'a_2.exr': its motion does not match 'a_1.exr'", wrong.stderr)
         self.good_render("-o", "c_#.exr", "--frame-seeds", "same", frames="1-2")
-        self.good_render("-o", "d_#.exr", "--frame-seeds", "same", "--seed", "5", frames="1-2")
+        self.good_render("-o", "d_#.exr", "--frame-seeds", "same", "--seed", "5", "--overwrite",
+                         frames="1-2")
         self.assertIn("'c_1.exr' and 'c_2.exr' have the same seed, 0",
                       self.denoise("c_#.exr", "d_#.exr", "-o", "o_#.exr").stderr)
 
@@ -368,7 +369,8 @@ class Combine(SequenceTest):
                                    (("-o", "c_#.exr", "--json", "c.json"), "--json 'c.json': of frames, expected"),
                                    (("-o", "c_#.exr", "--save-stages", "s"), "--save-stages is an option of single"),
                                    (("-o", "c_#.exr", "--crn", "a#/crn.exr"), "'a#/crn.exr' has no '#' for"),
-                                   (("-o", "c_#.exr", "--denoise", "auto"), "no layer 'Motion' of motion")):
+                                   (("-o", "c_#.exr", "--denoise", "auto", "--motion", "Flow"),
+                                    "no layer 'Flow' of motion")):
             result = self.combine(*arguments)
             self.assertNotEqual(result.returncode, 0)
             self.assertIn(message, result.stderr)
