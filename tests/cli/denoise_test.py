@@ -262,7 +262,7 @@ class Denoise(RenderTest):
             files = (f"{renderer}0.exr", f"{renderer}1.exr")
             said = self.good("denoise", *files, "-o", f"{renderer}.exr", *PLAIN).stderr
             self.assertIn("guided by albedo and normal", said, renderer)
-            results.add(tuple(read_exr((self.path / f"{renderer}.exr").read_bytes())["R"]))
+            results.add(tuple(read_exr((self.path / f"{renderer}.exr").read_bytes())[channels(picture)[0]]))
         self.assertEqual(len(results), 1, "the same pixels by every renderer's names")
         # Guides by name, and in files of their own as LuxCore writes them.
         self.write("albedo.exr", exr({c: albedo for c in "RGB"}, size))
@@ -300,8 +300,10 @@ class Denoise(RenderTest):
         self.good("combine", "--independent", "1.exr", "2.exr", "-o", "b.exr", "--denoise", "auto", "--oidn", oidn,
                   "--layers", "Direct", "Indirect")
         self.assert_add_up("b.exr", "Direct", "Indirect")
+        first = read_exr((self.path / "1.exr").read_bytes())
         self.assertEqual(set(plain), {"R", "G", "B", "StdError.R", "StdError.G", "StdError.B", "Bias.R", "Bias.G",
-                                      "Bias.B"})
+                                      "Bias.B", *(f"{layer}.{c}" for layer in ("Direct", "Indirect") for c in "RGB")})
+        self.assertEqual(plain["Direct.R"], first["Direct.R"], "as they are in the first render")
         self.bad(1, "no image 'Dirct'; did you mean 'Direct'?", *two, "--layers", "Dirct")
         self.bad(2, "--layers are denoised by a mixture, which needs a second render of another seed", "denoise",
                  "1.exr", "-o", "c.exr", "--layers", "Direct")
