@@ -30,26 +30,26 @@ const std::array<std::pair<const char*, ColourSpace>, 6>& known_spaces() {
   return spaces;
 }
 
-Vector times(const ColourMatrix& m, const Vector& v) {
+Vector times(const RgbMatrix& m, const Vector& v) {
   Vector result{};
   for (size_t row = 0; row < 3; ++row)
     for (size_t k = 0; k < 3; ++k) result[row] += m[row][k] * v[k];
   return result;
 }
 
-ColourMatrix times(const ColourMatrix& a, const ColourMatrix& b) {
-  ColourMatrix result{};
+RgbMatrix times(const RgbMatrix& a, const RgbMatrix& b) {
+  RgbMatrix result{};
   for (size_t row = 0; row < 3; ++row)
     for (size_t column = 0; column < 3; ++column)
       for (size_t k = 0; k < 3; ++k) result[row][column] += a[row][k] * b[k][column];
   return result;
 }
 
-ColourMatrix scaling(const Vector& v) { return {{{v[0], 0, 0}, {0, v[1], 0}, {0, 0, v[2]}}}; }
+RgbMatrix scaling(const Vector& v) { return {{{v[0], 0, 0}, {0, v[1], 0}, {0, 0, v[2]}}}; }
 
 /// By cofactors. Throws if there is none.
-ColourMatrix inverse(const ColourMatrix& m) {
-  ColourMatrix cofactors{};
+RgbMatrix inverse(const RgbMatrix& m) {
+  RgbMatrix cofactors{};
   for (size_t row = 0; row < 3; ++row)
     for (size_t column = 0; column < 3; ++column) {
       const size_t r1 = (row + 1) % 3, r2 = (row + 2) % 3, c1 = (column + 1) % 3, c2 = (column + 2) % 3;
@@ -73,8 +73,8 @@ Vector white_of(const ColourSpace& space) {
   return {w.x / w.y, 1, (1 - w.x - w.y) / w.y};
 }
 
-ColourMatrix to_xyz(const ColourSpace& space) {
-  ColourMatrix primaries{};
+RgbMatrix to_xyz(const ColourSpace& space) {
+  RgbMatrix primaries{};
   const std::array<ColourSpace::Point, 3> points = {space.red, space.green, space.blue};
   for (size_t c = 0; c < 3; ++c) {
     const double x = points[c].x, y = points[c].y;
@@ -84,9 +84,9 @@ ColourMatrix to_xyz(const ColourSpace& space) {
 }
 
 /// Bradford's cone responses (CIECAM97s).
-constexpr ColourMatrix kBradford = {{{0.8951, 0.2664, -0.1614}, {-0.7502, 1.7135, 0.0367}, {0.0389, -0.0685, 1.0296}}};
+constexpr RgbMatrix kBradford = {{{0.8951, 0.2664, -0.1614}, {-0.7502, 1.7135, 0.0367}, {0.0389, -0.0685, 1.0296}}};
 
-ColourMatrix adaptation(const ColourSpace& from, const ColourSpace& to) {
+RgbMatrix adaptation(const ColourSpace& from, const ColourSpace& to) {
   const Vector source = times(kBradford, white_of(from)), target = times(kBradford, white_of(to));
   Vector factors{};
   for (size_t k = 0; k < 3; ++k) factors[k] = target[k] / source[k];
@@ -127,14 +127,14 @@ ColourSpace named_colour_space(const std::map<std::string, std::string>& attribu
   return {};
 }
 
-ColourMatrix colour_conversion(const ColourSpace& from, const ColourSpace& to) {
+RgbMatrix colour_conversion(const ColourSpace& from, const ColourSpace& to) {
   const ColourSpace xyz = ColourSpace::xyz();
-  ColourMatrix matrix = to_xyz(from);
+  RgbMatrix matrix = to_xyz(from);
   if (!(from == xyz) && !(to == xyz)) matrix = times(adaptation(from, to), matrix);
   return times(inverse(to_xyz(to)), matrix);
 }
 
-void convert_colours(const ColourMatrix& matrix, Image& image) {
+void convert_colours(const RgbMatrix& matrix, Image& image) {
   COVARY_CHECK(image.channels == 3, "a picture of 3 channels");
   const size_t row = static_cast<size_t>(image.width) * 3;
   parallel_for(static_cast<size_t>(image.height), [&](size_t y) {

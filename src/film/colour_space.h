@@ -36,11 +36,11 @@ ColourSpace aces_colour_space();
 
 /// Factors [to][from]. Whites are adapted by Bradford's transformation; CIE XYZ has no white of its own, so colours
 /// move to and from it unchanged.
-using ColourMatrix = std::array<std::array<double, 3>, 3>;
+using RgbMatrix = std::array<std::array<double, 3>, 3>;
 /// Throws Error(kInput) if the primaries of either span no colours.
-ColourMatrix colour_conversion(const ColourSpace& from, const ColourSpace& to);
+RgbMatrix colour_conversion(const ColourSpace& from, const ColourSpace& to);
 
 /// Multiplies all colours; 3 channels.
-void convert_colours(const ColourMatrix& matrix, Image& image);
+void convert_colours(const RgbMatrix& matrix, Image& image);
 
 }  // namespace covary

@@ -13,7 +13,7 @@ using test_support::contains, test_support::message_of;
 
 const ColourSpace kAcesCg{{0.713f, 0.293f}, {0.165f, 0.83f}, {0.128f, 0.044f}, {0.32168f, 0.33767f}};
 
-void expect_matrix(const ColourMatrix& matrix, const ColourMatrix& expected, double tolerance) {
+void expect_matrix(const RgbMatrix& matrix, const RgbMatrix& expected, double tolerance) {
   for (size_t row = 0; row < 3; ++row)
     for (size_t column = 0; column < 3; ++column)
       EXPECT_NEAR(matrix[row][column], expected[row][column], tolerance) << row << ' ' << column;

@@ -40,7 +40,7 @@ class ImageRows {
   std::string path_, layer_;
   ImagePlace place_;
   ColourSpace colours_;
-  std::optional<ColourMatrix> conversion_;
+  std::optional<RgbMatrix> conversion_;
   bool low_dynamic_range_ = false;
   std::vector<std::string> names_;     // of the three channels
   std::unique_ptr<ExrFile> exr_;       // exactly one of
