@@ -140,7 +140,8 @@ void check_memory(const ConvertOptions& options) {
     width += std::max(place.window.width, place.frame_width);
     height = std::max({height, place.window.height, place.frame_height});
   }
-  require_image_memory(options.files.back(), width, height, (n_inputs > 1 ? 3 : 2) * kPixel);
+  require_image_memory(n_inputs > 1 ? options.files.back() : options.files[0], width, height,
+                       (n_inputs > 1 ? 3 : 2) * kPixel);
 }
 
 void expose(const ConvertOptions& options, Image& image) {

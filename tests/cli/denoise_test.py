@@ -51,12 +51,15 @@ class Denoise(RenderTest):
         return set(read_exr((self.path / name).read_bytes()))
 
     def test_less_error_in_the_order_of_the_dial(self):
-        self.good("render", ROOM, *SMALL, "-o", "r.exr", "--estimator", "none", "--spp", "512", "--seed", "9")
+        self.good("render", ROOM, *SMALL, "-o", "r.exr", "--estimator", "none", "--spp", "512", "--seed", "99")
         errors = {}
         for mode in ("none", "bias", "balanced", "error"):
             options = () if mode == "none" else PLAIN
-            self.good("render", ROOM, *SMALL, "-o", f"{mode}.exr", *IICV, "--denoise", mode, *options, "--spp", "48")
-            errors[mode] = self.relmse(f"{mode}.exr", "r.exr")
+            errors[mode] = 0
+            for seed in map(str, range(10)):  # one firefly more or less is a fifth of one image's error
+                self.good("render", ROOM, *SMALL, "-o", f"{mode}.exr", *IICV, "--denoise", mode, *options, "--spp",
+                          "48", "--seed", seed, "--overwrite")
+                errors[mode] += self.relmse(f"{mode}.exr", "r.exr") / 10
         self.assertLess(errors["bias"], 1.1 * errors["none"])
         self.assertLess(errors["balanced"], 0.9 * errors["none"])
         self.assertLess(errors["error"], 0.8 * errors["none"])
