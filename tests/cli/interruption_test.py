@@ -91,7 +91,8 @@ class AtRandomTimes(CliTest):
             process.send_signal(signal.SIGINT)
             message = process.communicate(timeout=60 * SLOWDOWN)[1]
             picture = self.path / f"{i}.exr"
-            self.assertIn(process.returncode, (0, 130), message)  # 0: it had ended
+            # 0: it had ended; -SIGINT, for shells 130, too: it had not begun.
+            self.assertIn(process.returncode, (0, 130, -signal.SIGINT), message)
             has_picture = "is the image so far" in message or "' was written" in message
             if process.returncode == 0 or has_picture:
                 pictures += 1
@@ -99,7 +100,7 @@ class AtRandomTimes(CliTest):
                 self.assertTrue(all(math.isfinite(v) for c in "RGB" for v in values[c]))
                 self.assertGreater(sum(values["G"]), 0)
             else:
-                self.assertIn("interrupted", message)
+                self.assertTrue("interrupted" in message or process.returncode == -signal.SIGINT, message)
                 self.assertFalse(picture.exists(), message)
         self.assertGreater(pictures, 0)
 

@@ -102,7 +102,8 @@ class Frames(SequenceTest):
         self.assertGreater(max(abs(m) for m in self.channels("f_2.exr")["Motion.X"]), 1)
         result = self.run_covary("render", "room_#.xml", *QUIET, *SMALL_WORDS, "--frames", "2-3", "-o", "g_#.exr")
         self.assertIn("room_3.xml", result.stderr)
-        self.assertTrue((self.path / "g_2.exr").exists())
+        self.assertEqual(result.returncode, 1)
+        self.assertFalse((self.path / "g_2.exr").exists(), "found before the first frame is rendered")
 
     def test_seeds_of_frames(self):
         self.write_path((0, START))
