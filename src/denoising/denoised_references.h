@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What errors against two noisy references are relative to (ours): the references denoised without a network, each from
+// What errors against two noisy references are relative to : the references denoised without a network, each from
 // its own values, so that the noise of one does not enter the weight made of the other.
 #pragma once
 

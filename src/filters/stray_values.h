@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Values that no estimate can use: a single group of one pixel that outshines the whole picture (ours). If light of
+// Values that no estimate can use: a single group of one pixel that outshines the whole picture. If light of
 // such samples made up as much of the picture as everything else, n pixels of brightness m would hold n m T / v groups
 // of T with the value v: less than one in kMostOfPicture. Such values come from divisions by nearly 0; with one of
 // them, held-out samples judge nothing else.
