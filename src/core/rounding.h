@@ -46,11 +46,12 @@ inline Vec3 offset_target(const Vec3& p, const Vec3& ng, float offset, const Vec
   return offset_origin(p, ng, offset + 4 * kRounding * length, -w);
 }
 
-/// The ray from `o` to a point that is not on a surface, such as that of offset_target().
+/// The ray from `o` to a point that is not on a surface, such as that of offset_target(). It has no length and no
+/// direction if both are the same point, as where floats are so far apart that nothing is between a point and a light.
 inline Ray ray_between(const Vec3& o, const Vec3& target) {
   const Vec3 d = target - o;
   const float distance = length(d);
-  return {o, d * (1 / distance), distance * (1 - 4 * kRounding)};
+  return {o, d * (distance > 0 ? 1 / distance : 0.0f), distance * (1 - 4 * kRounding)};
 }
 
 }  // namespace covary

@@ -234,6 +234,17 @@ TEST(RayOrigins, ShadowRaysEndBetweenALightAndItsShade) {
   }
 }
 
+/// Where nothing is between a point and a light, the ray is empty, and nothing blocks it; no number in it is NaN.
+TEST(RayOrigins, ARayOfNoLengthIsNotBlocked) {
+  const auto scene = scene_of({std::make_shared<Disk>(Transform(), false)});
+  const Ray ray = ray_between({0, 0, 0.5f}, {0, 0, 0.5f});
+  EXPECT_EQ(ray.d, Vec3{});
+  EXPECT_EQ(ray.t_max, 0);
+  EXPECT_FALSE(scene->occluded(ray));
+  SurfaceHit hit;
+  EXPECT_FALSE(scene->intersect(ray, hit));
+}
+
 /// Embree's linear curves of such small segments were missed or too thick; a curve of one unit is the reference.
 TEST(RayOrigins, LinearCurvesAreAsThickAtEverySize) {
   const auto n_hits = [](float scale) {
