@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/detached_work.h"
 #include "scene/analytic_shape.h"
 #include "scene/curve.h"
 #include "scene/mesh.h"
@@ -114,6 +115,10 @@ void set_shape(RTCGeometry geometry, const Shape& shape) {
   rtcCommitGeometry(geometry);
 }
 
+void commit_scene(RTCScene scene) {
+  run_outside([scene] { rtcCommitScene(scene); });
+}
+
 Transform rounded(const Transform& to_world) {
   Matrix4 m = to_world.matrix();
   for (auto& row : m)
@@ -139,7 +144,7 @@ void set_enlarged(RTCDevice device, RTCGeometry instance, const CurveShape& curv
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(scene, geometry);
   rtcReleaseGeometry(geometry);
-  rtcCommitScene(scene);
+  commit_scene(scene);
   rtcSetGeometryInstancedScene(instance, scene);
   rtcReleaseScene(scene);
   set_placement(instance, Transform::scale(Vec3{1, 1, 1} * (1 / scale)));

@@ -24,6 +24,9 @@ void set_shape(RTCGeometry geometry, const Shape& shape);
 /// enlarged if a segment is shorter than kShortSegment (curve.h).
 float enlargement(const Shape& shape);
 
+/// Builds the hierarchy; outside of the surrounding work, because each of Embree's scenes keeps a task group.
+void commit_scene(RTCScene scene);
+
 /// The transformation as Embree has it, in floats.
 Transform rounded(const Transform& to_world);
 

@@ -6,7 +6,6 @@
 #include <string>
 #include <utility>
 
-#include "core/detached_work.h"
 #include "core/error.h"
 #include "scene/embree_geometry.h"
 #include "scene/mesh.h"
@@ -99,11 +98,6 @@ void place(SurfaceHit& hit, const Transform& to_world, const Vec3& slack, bool w
   hit.dp_du = to_world.vector(hit.dp_du);
   hit.dp_dv = to_world.vector(hit.dp_dv);
   hit.frame = Frame::from_tangent(n, hit.dp_du);
-}
-
-/// Builds the hierarchy; outside of the surrounding work, because each of Embree's scenes keeps a task group.
-void commit_scene(RTCScene scene) {
-  run_outside([scene] { rtcCommitScene(scene); });
 }
 
 void release(RTCDevice device, RTCScene top, const auto& groups) {

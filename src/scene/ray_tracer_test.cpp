@@ -12,6 +12,7 @@
 #include "core/random.h"
 #include "core/stop.h"
 #include "scene/analytic_shape.h"
+#include "scene/curve.h"
 #include "scene/mesh.h"
 #include "scene/scene.h"
 
@@ -92,7 +93,9 @@ TEST(RayTracer, OutlivesTheWorkThatMadeIt) {
   std::unique_ptr<Scene> scene;
   const std::atomic<bool> never{false};
   ASSERT_TRUE(run_stoppable(&never, [&] {
-    scene = scene_of({std::make_shared<Sphere>(Transform(), Vec3{0, 0, 0}, 1.0f, false)});
+    const std::vector<CurvePoint> points{{3, 0, 0, 1e-3f}, {3.01f, 0, 0, 1e-3f}};  // a scene of its own in Embree
+    scene = scene_of({std::make_shared<Sphere>(Transform(), Vec3{0, 0, 0}, 1.0f, false),
+                      std::make_shared<CurveShape>(CurveKind::kLinear, points, std::vector<uint32_t>{0})});
   }));
   for (int i = 0; i < 20; ++i) {
     std::atomic<bool> stop{false};
