@@ -3,7 +3,7 @@
 #
 #   make setup            install missing packages (needs root or sudo only if something is missing)
 #   make build            build/release/covary
-#   make demo             render a small scene by path tracing, IICV and the default into out/
+#   make demo             render a small scene by path tracing, Open Image Denoise and covary into out/
 #   make test             build and run all tests except nightly ones        TESTS=regex selects some
 #   make check            lint every file, run the tests under sanitizers and with Clang and the standard library's
 #                         assertions, run each fuzz target for a minute (FUZZ=seconds); takes hours
