@@ -53,6 +53,7 @@ struct CombineOptions : CombineSettings {
 };
 
 Estimator estimator_of(const CombineOptions& o) {
+  if (o.estimator == kDefaultEstimator) return make_default_estimator(!o.crn.empty(), o.of_estimator, o.denoising);
   return with_denoising(make_estimator(o.estimator, o.of_estimator), o.denoising);
 }
 
@@ -74,7 +75,7 @@ void check_explain(const CombineOptions& o, const Estimator& estimator, const Gr
   const CropWindow& window = file.place().window;
   const int x = o.explain->x - window.x, y = o.explain->y - window.y;
   if (estimator.reads_guides)
-    throw Error(ErrorCode::kUsage, "--explain: with --denoise, a pixel is not a sum of control variates");
+    throw Error(ErrorCode::kUsage, "--explain: a pixel that is denoised is not a sum of control variates; see --estimator iicv");
   if (!estimator.explain)
     throw Error(ErrorCode::kUsage, "--explain: " + o.estimator + " has no control variates with coefficients");
   if (x < 0 || y < 0 || x >= window.width || y >= window.height)
@@ -141,7 +142,7 @@ struct GuideImages {
 GuideImages read_guides(const CombineOptions& o, const Estimator& estimator, const GroupedFile& file) {
   if (o.guides.empty()) return {};
   if (!estimator.reads_guides)
-    throw Error(ErrorCode::kUsage, "--guides is an option of --denoise auto, bias, balanced and error");
+    throw Error(ErrorCode::kUsage, "--guides is an option of --denoise auto, bias, balanced and error, not of " + estimator.name);
   const ImageInfo info = inspect_image(o.guides);
   const auto own = [&](const char* name) -> std::optional<Image> {  // guides that `render` wrote
     const bool is_there = std::any_of(info.channels.begin(), info.channels.end(),
@@ -286,16 +287,17 @@ void write_stages(const CombineOptions& o, const CombineRequest& request) {
 }
 
 /// Without a CRN image, the only use is to denoise the independent image's mean. Throws Error(kUsage) otherwise.
-void check_passes(CombineOptions& o) {
+void check_passes(const CombineOptions& o) {
   if (!o.crn.empty()) return;
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
+  if (o.estimator != kDefaultEstimator)
+    usage(fmt::format("--estimator {} needs the image with common random numbers, --crn", o.estimator));
   if (!o.denoising.denoises())
     usage(
         "without --crn, independent images can only be denoised: --denoise auto, bias, balanced or error (their mean "
         "is made by covary merge)");
-  for (const char* option : {"estimator", "crn-layer", "samples", "explain"})
+  for (const char* option : {"crn-layer", "samples", "explain"})
     if (o.values.contains(option)) usage(fmt::format("--{} needs the image with common random numbers, --crn", option));
-  o.estimator = kNoEstimator;
 }
 
 void combine_files(const CombineOptions& o) {

@@ -163,8 +163,8 @@ void denoise_by_network(const Options& o, const GuideLayers& guides, ProgressLin
 void denoise_by_mixture(const Options& o, const GroupedFile& file, const GuideLayers& guides, ProgressLine& progress) {
   CombineRequest request;
   request.independent = source_of(file);
-  const DenoisingChoice choice{o.mode.empty() ? "auto" : o.mode, o.oidn, {o.history}};
-  request.estimator = with_denoising(make_estimator(kNoEstimator), choice);
+  const DenoisingChoice choice{o.mode.empty() ? usual_denoising(kDefaultEstimator) : o.mode, o.oidn, {o.history}};
+  request.estimator = make_default_estimator(false, {}, choice);
   request.settings.std_error = true;
   request.settings.guides = guides.view();
   std::deque<GroupedFile> layers;

@@ -14,7 +14,7 @@
 #include "io/load_scene.h"
 #include "io/scene_file.h"
 #include "json_output.h"
-#include "plans/estimator_plans.h"
+#include "plans/render_settings.h"
 #include "plans/memory.h"
 #include "plans/render.h"
 #include "settings/option_names.h"
@@ -60,7 +60,7 @@ std::string describe_channels(const std::vector<ExrFile::Channel>& channels) {
 std::map<std::string, double> memory_of_renders(const LoadedScene& scene) {
   std::map<std::string, double> memory;
   for (const char* name : {kDefaultEstimator, kNoEstimator})
-    memory[name] = render_memory(scene, estimator_plan(make_estimator(name)), {}).total();
+    memory[name] = render_memory(scene, render_plan(settings_from<RenderSettings>({{"estimator", name}}), {}), {}).total();
   return memory;
 }
 

@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "combine/registry.h"
 #include "commands.h"
 #include "core/shell_text.h"
 #include "declared_options.h"
@@ -72,7 +73,7 @@ std::vector<std::string> commands_of_films(const std::vector<fs::path>& folders,
     combine.insert(combine.end(), {"--" + kind, kind + ".exr"});
   }
   combine.insert(combine.end(), {"-o", output});
-  if (estimator != "iicv") combine.insert(combine.end(), {"--estimator", estimator});
+  if (estimator != kDefaultEstimator) combine.insert(combine.end(), {"--estimator", estimator});
   commands.push_back(shell_text(combine));
   return commands;
 }

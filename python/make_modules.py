@@ -110,7 +110,8 @@ def estimators_module(estimators):
                        "    from ._combine import DenoiseMode, Progress\n    from ._result import Result\n"
                        "    from .film import Film\n")
     names = sorted([identifier(e["name"]) for e in pairs])
-    types = [f"#: Estimators of two images.\nPairEstimator = {literal([e['name'] for e in pairs])}",
+    of_pairs = [e["name"] for e in estimators if e["is_default"] or e in pairs]
+    types = [f"#: Estimators of two images.\nPairEstimator = {literal(of_pairs)}",
              f"#: Those of render().\nEstimator = {literal([e['name'] for e in estimators])}"]
     return "\n".join([head, f"__all__ = {names!r}", "", *types, *(f"\n\n{estimator_function(e)}" for e in pairs), ""])
 

@@ -29,11 +29,11 @@ _LAYERS = optional(mapping_of(IMAGE, "a mapping from names to arrays"))
 
 
 @checked(crn=IMAGE, independent=IMAGE, estimator=text, light=IMAGE, counts=array,
-         samples=optional(whole(1, _covary.most_samples)), denoise=DENOISE, albedo=array, normal=array,
+         samples=optional(whole(1, _covary.most_samples)), denoise=optional(DENOISE), albedo=array, normal=array,
          denoising_albedo=array, denoising_normal=array, position=array, layers=_LAYERS, oidn=OIDN,
          std_error=optional(flag), force=flag, progress=optional(function))
-def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, light: Film | None = None,
-            counts: Any = None, samples: int | None = None, denoise: DenoiseMode = "none", albedo: Any = None,
+def combine(crn: Any, independent: Any, estimator: PairEstimator = "mixture", *, light: Film | None = None,
+            counts: Any = None, samples: int | None = None, denoise: DenoiseMode | None = None, albedo: Any = None,
             normal: Any = None, denoising_albedo: Any = None, denoising_normal: Any = None, position: Any = None,
             layers: Mapping[str, Any] | None = None, oidn: str | PathLike[str] = "", std_error: bool | None = None,
             force: bool = False, progress: Progress | None = None, **options: OptionValue) -> Result:
@@ -44,13 +44,14 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, li
     are recommended. The memory order [H, W, T, 3], as from read_groups() and Film.groups, is read in place. Without crn
     (None), `independent` alone is denoised, from two groups on.
 
-    estimator: "iicv", or a method to compare with; its options follow as keywords (typed in covary.estimators).
+    estimator: the default mixes denoised images into the combined one where held-out samples prefer them; "iicv" does
+        not denoise, and the others are there to compare with. Options follow as keywords (typed in covary.estimators).
     light: the film of light paths (pass "light"), to add to the result.
     counts: samples per pixel of the independent image over all groups, if they vary: whole numbers [H, W]; a Film
         knows its own. Needs samples.
     samples: samples per pixel of the CRN image, for counts and for estimators that need them.
-    denoise: mix in denoised images where held-out samples prefer them: for the least error ("auto", "error"), for
-        little bias ("bias"), or balanced. albedo, normal, position: guides [H, W, 3], the others only with the albedo;
+    denoise: for the least error ("auto", "error"), for little bias ("bias"), balanced, or "none"; by default "auto", or
+        "none" if another estimator is named. albedo, normal, position: guides [H, W, 3], the others only with the albedo;
         denoising_albedo, denoising_normal: guides seen through mirrors and glass (from render(): aovs["Albedo"],
         "N", "P", "DenoisingAlbedo", "DenoisingNormal"); oidn: Open Image Denoise's library or its folder, by default
         searched for; "off": not used.
@@ -66,7 +67,7 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, li
     check_no_passes(options, "here are images that are rendered: counts= tells the samples that their pixels have")
     return Result(**_covary.combine(crn, independent, None if counts is None else _counts(counts), light, albedo,
                                     normal, denoising_albedo, denoising_normal, position, dict(layers or {}), estimator,
-                                    text_options(options, estimator), denoise, fspath(oidn), force, std_error, samples,
+                                    text_options(options, estimator), denoise or "", fspath(oidn), force, std_error, samples,
                                     progress))
 
 
@@ -99,7 +100,7 @@ def check_options(estimator: str, options: Mapping[str, Any]) -> None:
         raise UsageError(f"{min(set(given) - set(known))}: is not accepted where the images are rendered")
     rest = {name: value for name, value in options.items() if name not in known}
     check_no_passes(rest, "here both images have the same number in all pixels")
-    _covary.check_pair_estimator(estimator, text_options(rest, estimator), known.get("denoise", "none"),
+    _covary.check_pair_estimator(estimator, text_options(rest, estimator), known.get("denoise") or "",
                                  known.get("oidn", ""))
 
 

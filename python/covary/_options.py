@@ -19,6 +19,10 @@ def _registry() -> dict[str, dict[str, Any]]:
     return {known["name"]: known for known in _covary.estimators()}
 
 
+#: The estimator that is used unless another is named.
+DEFAULT: str = next(known["name"] for known in _covary.estimators() if known["is_default"])
+
+
 def passes_of(estimator: str) -> str | None:
     """"pair", "samples" or "any"; None if there is no such estimator."""
     return _registry()[estimator]["passes"] if estimator in _registry() else None

@@ -16,7 +16,7 @@ from ._arguments import (
     text, whole,
 )
 from ._combine import DENOISE, DenoiseMode, Progress
-from ._options import declared_rules, option_texts, passes_of, text_options, underscored
+from ._options import DEFAULT, declared_rules, option_texts, passes_of, text_options, underscored
 from ._result import BadSample, RenderResult, text_of_bad_samples
 from .errors import BadSamplesWarning, UsageError
 
@@ -127,7 +127,7 @@ def _check_together(estimator: str | None, given: Mapping[str, Any]) -> None:
     for first, second in (("resume", "overwrite"), ("until", "until_p95")):
         if given[first] and given[second]:
             raise UsageError(f"found {first} and {second}; expected one of them")
-    passes = passes_of(estimator or "none")
+    passes = passes_of(estimator or DEFAULT)
     if given["sampling"] is not None and passes not in ("any", None):
         raise UsageError(f"sampling: found {given['sampling']!r} with estimator {estimator!r}, which chooses itself; "
                          "it is an argument of estimator 'none'")
@@ -171,8 +171,9 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     """Renders a scene, or a scene file, as `covary render` does, to the same bits.
 
     spp: samples per pixel over all passes; by default the scene's, or no limit with `until` or `time`.
-    estimator: "none", the default, is the mean of independent samples; "iicv" uses common random numbers for half of
-        the samples. Its options are keywords, too.
+    estimator: the default is the mean of independent samples, with denoised images mixed in where held-out samples
+        prefer them; "none" is the mean alone, "iicv" uses common random numbers for half of the samples. Its options
+        are keywords, too.
     integrator: instead of the scene's.
     until: add samples until the predicted relMSE is this; until_p95: until it is in 95 % of the blocks of 16 x 16
         pixels.
@@ -196,7 +197,7 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
                                 "output": output, "passes": passes, "until": until, "until_p95": until_p95,
                                 "sampling": keywords.get("sampling"), "split": split})
     declared = {name.replace("_", "-"): keywords.pop(name) for name in _DECLARED if name in keywords}
-    texts = text_options(keywords, estimator or "none")
+    texts = text_options(keywords, estimator or DEFAULT)
     chosen = scene if isinstance(scene, Scene) else Scene.load(scene, integrator=integrator)
     chosen = chosen.with_integrator(integrator)
     if checkpoint is None:

@@ -24,7 +24,7 @@ from ._cluster import CLIENT, SceneFiles, check_versions, dask, make_plugin, res
 from ._combine import Progress, check_options, combine, guides_of
 from ._experiment import experiment, main
 from ._frames import frames
-from ._options import OptionValue, check_no_passes, option_texts
+from ._options import DEFAULT, OptionValue, check_no_passes, option_texts
 from ._parts import Part, PartFolder, Rendered
 from ._render import SCENE, SEED, SPP, Scene, report_bad_samples
 from ._render import render as render_here
@@ -39,7 +39,9 @@ if TYPE_CHECKING:
 __all__ = ["ClusterResult", "SceneFiles", "experiment", "frames", "main", "render"]
 
 #: Estimators that only use the finished films, and do not change what is sampled.
-_ESTIMATORS = ("iicv", "cv-baseline", "iduw", "none")
+_ESTIMATORS = (DEFAULT, "iicv", "cv-baseline", "iduw", "none")
+#: Those of one pass.
+_OF_ONE_IMAGE = (None, DEFAULT, "none")
 #: Options of an image made from one pass.
 _OF_ONE_PASS = ("denoise", "oidn")
 #: Keywords of covary.render() that say what is sampled.
@@ -198,10 +200,10 @@ def _plan(scene: Scene, spp: int, estimator: str | None, seed: int, sample_range
     if scene.integrator not in ("path", ""):
         raise UsageError(f"the integrator '{scene.integrator}' trains or traces light over the whole frame; on a "
                          "cluster use path")
-    if estimator in (None, "none"):
+    if estimator in _OF_ONE_IMAGE:
         check_some(render_here, options)
         if unknown := set(options) - set(_OF_ONE_PASS):
-            raise UsageError(f"{min(unknown)}: is not an argument of estimator {estimator or 'none'!r}; expected "
+            raise UsageError(f"{min(unknown)}: is not an argument of estimator {estimator or DEFAULT!r}; expected "
                              f"one of {', '.join(_OF_ONE_PASS)}")
     else:
         check_options(estimator, options)
@@ -227,7 +229,7 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     """Renders on the workers of a dask.distributed.Client.
 
     spp: samples per pixel of all passes and ranges together.
-    estimator: as in covary.render(); by default the mean of independent samples, mixed with denoised images.
+    estimator: as in covary.render().
     sample_ranges: number of seeds, from `seed` on, among which the samples are divided; their films are merged.
         With 1 the result has the bits of `covary.render(scene, spp, estimator, seed=seed)`, with more those of
         merge_films() of such renders, for any number of workers, even if some fail.
@@ -301,7 +303,7 @@ def _result(canvas: _Canvas, plan: _Plan, n_kept: int, seconds: float) -> Cluste
     made: Result
     films = canvas.films()
     samples = sum(film.samples_per_pixel for film in films.values())
-    if plan.estimator in (None, "none"):
+    if plan.estimator in _OF_ONE_IMAGE:
         values = option_texts({"estimator": plan.estimator, **plan.options})
         made = RenderResult(**_covary.image_of_films(values, {}, films, canvas.aovs))
     else:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mitsuba 3 (`pip install mitsuba`, its LLVM and CUDA variants) as the renderer of both images."""
+"""Mitsuba 3 (`pip install mitsuba`, its LLVM and CUDA variants) as the renderer of the images."""
 from __future__ import annotations
 
 import time
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ._arguments import checked, either, flag, function, instance, optional, path, text, whole
 from ._combine import Progress, check_options, combine, guides_of
 from ._covary import most_groups
-from ._options import OptionValue
+from ._options import DEFAULT, OptionValue
 from ._render import SEED, SPP
 from ._result import Result, fields_of
 from .errors import UsageError
@@ -35,7 +35,8 @@ _defined: dict[str, None] = {}
 class MitsubaResult(Result):
     """The result of render()."""
 
-    #: "crn" and "independent", to try other estimators: `covary.combine(films["crn"], films["independent"], …)`.
+    #: "independent", and "crn" for estimators of two images, to try others:
+    #: `covary.combine(films.get("crn"), films["independent"], …)`.
     films: dict[str, Film] = field(repr=False)
     render_seconds: float
     estimate_seconds: float
@@ -267,18 +268,18 @@ _INTEGRATOR = optional(instance("an Integrator of Mitsuba, its name, or a dictio
 @checked(scene=_SCENE, spp=SPP, seed=SEED, integrator=_INTEGRATOR, sensor=whole(0), groups=whole(3, most_groups),
          estimator=text, aovs=flag, progress=optional(function))
 def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: int = 0, *, groups: int = 12,
-           estimator: PairEstimator = "iicv", aovs: bool = False, progress: Progress | None = None,
+           estimator: PairEstimator = "mixture", aovs: bool = False, progress: Progress | None = None,
            **options: OptionValue) -> MitsubaResult:
-    """Renders a scene with Mitsuba, half of the samples with common random numbers and half with independent ones, and
-    combines both.
+    """Renders a scene with Mitsuba and takes its noise out. By default all samples are independent, and the image is
+    made as by covary.render(); for estimators of two images, half of the samples have common random numbers.
 
     scene: a mitsuba.Scene, or the name of an XML file.
-    spp: samples per pixel of both images together.
+    spp: samples per pixel, of both images together.
     integrator: instead of the scene's; an Integrator, its name, or a dictionary for mitsuba.load_dict().
     sensor: its index in the scene.
-    groups: number of groups of samples in each image, at least 3; fewer if there are fewer samples.
+    groups: number of groups of samples in each image; fewer if there are fewer samples.
     aovs: also render albedo and shading normals, "Albedo" and "N", and those seen in mirrors and through glass,
-        "DenoisingAlbedo" and "DenoisingNormal". With `denoise` they are always rendered, and guide it.
+        "DenoisingAlbedo" and "DenoisingNormal". Where the image is denoised they are always rendered, and guide it.
     progress: called with (done, total) groups.
     options: of the estimator.
 
@@ -295,14 +296,17 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
     camera = loaded.sensors()[sensor]
     warnings = _check_sensor(camera)
     chosen = _integrator(mi, loaded, integrator)
-    count = spp // 2
-    if spp % 2 or count < 3:
+    kinds = ("independent",) if estimator == DEFAULT else ("crn", "independent")
+    count = spp // len(kinds)
+    if estimator == DEFAULT and count < 2:
+        raise UsageError(f"spp: found {spp} sample per pixel; 2 or more are needed to tell noise from the picture")
+    if estimator != DEFAULT and (spp % 2 or count < 3):
         raise UsageError(f"spp: found {spp} samples per pixel; an even number, 6 or more, is needed: half of the "
                          "samples have common random numbers")
     groups = min(groups, count)
 
     started = time.perf_counter()
-    total = 2 * groups
+    total = len(kinds) * groups
     done = 0
 
     def finished(number: int) -> None:
@@ -312,12 +316,12 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
             progress(done, total)
 
     films = {name: _film(mi, loaded, camera, chosen, name, count, groups, seed, finished)
-             for name in ("crn", "independent")}
-    denoises = options.get("denoise", "none") != "none"
+             for name in kinds}
+    denoises = (options.get("denoise") or ("auto" if estimator == DEFAULT else "none")) != "none"
     guides = _guides(mi, loaded, camera, seed) if aovs or denoises else {}
     rendered = time.perf_counter()
     known: dict[str, Any] = (guides_of(guides) if denoises else {}) | options
-    result = combine(films["crn"], films["independent"], estimator, **known)
+    result = combine(films.get("crn"), films["independent"], estimator, **known)
     estimated = time.perf_counter()
     given = fields_of(result) | {"warnings": warnings + result.warnings, "aovs": guides}
     return MitsubaResult(**given, films=films, render_seconds=rendered - started,

@@ -165,8 +165,9 @@ std::vector<std::string> texts_of(const std::vector<Finding>& findings) {
   return texts;
 }
 
-DenoisingChoice denoising_of(const std::string& mode, const std::string& oidn) {
-  OptionValues values{{"denoise", mode}};
+/// `mode`: "": the usual one of the estimator.
+DenoisingChoice denoising_of(const std::string& estimator, const std::string& mode, const std::string& oidn) {
+  OptionValues values{{"denoise", mode.empty() ? usual_denoising(estimator) : mode}};
   if (!oidn.empty()) values["oidn"] = oidn;
   return settings_from<DenoisingChoice>(values);
 }
@@ -180,8 +181,8 @@ struct GuideImages {
       if (array.is_none()) return;
       if (!estimator.reads_guides)
         throw Error(ErrorCode::kUsage, std::string(name) +
-                                           ": guides are of denoise='auto', 'bias', 'balanced' and "
-                                           "'error'");
+                                           ": guides are of denoising, with denoise='auto', "
+                                           "'bias', 'balanced' or 'error'");
       to = image_of(array, name, shape);
     };
     take(beside.albedo, "albedo", albedo);
@@ -215,6 +216,8 @@ const Film* film_of(nb::handle light) {
 /// The estimator for two images, or for an independent one that is denoised.
 Estimator estimator_of(bool is_pair, const std::string& name, const OptionValues& options,
                        const DenoisingChoice& denoising) {
+  if (name == kDefaultEstimator && (is_pair || denoising.denoises()))
+    return make_default_estimator(is_pair, options, denoising);
   if (is_pair) return with_denoising(make_pair_estimator(name, options), denoising);
   if (name != kDefaultEstimator && name != kNoEstimator)
     throw Error(ErrorCode::kUsage,
@@ -232,7 +235,7 @@ nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, c
   Pair pair(crn, independent, light);
   CombineRequest& request = pair.request;
   request.estimator = estimator_of(pair.crn.has_value(), arguments.estimator, arguments.options,
-                                   denoising_of(arguments.denoise, arguments.oidn));
+                                   denoising_of(arguments.estimator, arguments.denoise, arguments.oidn));
   const Estimator& estimator = request.estimator;
   const bool has_counts = !beside.counts.is_none();
   request.settings =
@@ -285,7 +288,7 @@ std::vector<float> some_values(size_t n, size_t step) {
 void check_pair_estimator(const std::string& name, const OptionValues& options, const std::string& denoise,
                           const std::string& oidn) {
   constexpr int kSide = 8, kGroups = 24;
-  const Estimator estimator = with_denoising(make_pair_estimator(name, options), denoising_of(denoise, oidn));
+  const Estimator estimator = estimator_of(true, name, options, denoising_of(name, denoise, oidn));
   const std::optional<int> samples = estimator.needs_sample_count ? std::optional(kGroups) : std::nullopt;
   const PairSettings settings = pair_settings(estimator, samples, kGroups, estimator.predicts_error);
   const std::vector<float> first = some_values(kSide * kSide * kGroups * 3, 37),

@@ -77,6 +77,7 @@ nb::list estimators() {
     d["summary"] = estimator.summary;
     d["passes"] = name_of(estimator.passes);
     d["predicts_error"] = estimator.predicts_error;
+    d["is_default"] = name == kDefaultEstimator;
     d["denoises"] = can_be_denoised(estimator);
     d["fewest_groups"] = estimator.fewest_groups;
     d["options"] = list_of(options_of_estimator(name));

@@ -24,8 +24,8 @@ std::string read_pixel(const std::string& text, std::optional<PixelPosition>& pi
 
 void declare_images(Settings& s, CombineSettings& v) {
   s.texts("crn", v.crn, "FILE",
-          "Image with common random numbers: one EXR with all groups, or one per group; without it, `denoise` works on "
-          "the mean of the independent image",
+          "Image with common random numbers: one EXR with all groups, or one per group; without it, the independent "
+          "image is denoised",
           kFile);
   s.texts("independent", v.independent, "FILE", "Image with independent random numbers, likewise",
           {.aliases = {"pt"}, .names = OptionNames::kFile});
@@ -44,13 +44,17 @@ void declare_images(Settings& s, CombineSettings& v) {
 
 void declare(Settings& s, CombineSettings& v) {
   declare_images(s, v);
-  s.one_of("estimator", v.estimator, pair_estimator_names(), "iicv, or a method to compare with");
+  std::vector<std::string> names = pair_estimator_names();
+  names.insert(names.begin(), kDefaultEstimator);
+  s.one_of("estimator", v.estimator, names,
+           "How the images are combined. The default denoises, by mixing; others are denoised only by `denoise`");
+  v.denoising.mode = usual_denoising(v.estimator);
   declare(s, v.denoising);
   s.group("");
-  s.text("guides", v.guides, "FILE", "For `denoise`: image (EXR) of the same pixels with the layers Albedo, N and P",
+  s.text("guides", v.guides, "FILE", "For denoising: image (EXR) of the same pixels with the layers Albedo, N and P",
          kFile);
   s.texts("layers", v.layers, "LAYER",
-          "For `denoise`: layers of the independent image's files to denoise with it; with Rest, they add up to the "
+          "For denoising: layers of the independent image's files to denoise with it; with Rest, they add up to the "
           "result");
   s.whole("samples", v.samples, {.low = 1, .high = std::numeric_limits<int>::max()},
           fmt::format("With `counts`, or {}: samples per pixel of the CRN image; default: as its file says",

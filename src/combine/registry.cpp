@@ -18,12 +18,13 @@ namespace covary {
 
 std::span<const EstimatorPlugin> estimator_plugins() {
   static constexpr EstimatorPlugin kPlugins[] = {
-      {"iicv", make_iicv},
+      {kMixture, make_mixture},
+      {kIicv, make_iicv},
       {"cv-baseline", make_cv_baseline},
       {"iduw", make_iduw},
       {"dependent-tests", make_dependent_tests},
       {"polynomials", make_polynomials},
-      {"none", make_none},
+      {kMeanName, make_none},
   };
   return kPlugins;
 }
@@ -91,6 +92,14 @@ Estimator with_denoising(const Estimator& base, const DenoisingChoice& choice) {
   if (options.use_oidn) options.oidn.library = choice.oidn;
   options.history = choice.history;
   return with_denoising(base, options);
+}
+
+std::string usual_denoising(const std::string& estimator) {
+  return estimator == kDefaultEstimator ? DenoisingChoice::kAuto : DenoisingChoice::kNone;
+}
+
+Estimator make_default_estimator(bool is_pair, const OptionValues& values, const DenoisingChoice& choice) {
+  return with_denoising(make_estimator(is_pair ? kIicv : kDefaultEstimator, values), choice);
 }
 
 std::vector<std::string> estimators_with_option(const std::string& option) {

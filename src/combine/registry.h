@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "denoising/mixed_denoising.h"
 #include "estimators/estimator.h"
+#include "estimators/mean.h"
 #include "settings/settings.h"
 
 namespace covary {
-
-struct DenoisingChoice;
 
 struct EstimatorPlugin {
   const char* name;
@@ -22,8 +22,11 @@ struct EstimatorPlugin {
 /// All estimators, the default first.
 std::span<const EstimatorPlugin> estimator_plugins();
 
-inline constexpr const char* kDefaultEstimator = "iicv";
-inline constexpr const char* kNoEstimator = "none";  ///< the film is the image
+/// What every command, bridge and library call does unless told otherwise: denoised images are mixed in where held-out
+/// samples prefer them. Of independent samples it mixes into their mean, of a pair with common random numbers into that
+/// pair's image (make_default_estimator()).
+inline constexpr const char* kDefaultEstimator = kMixture;
+inline constexpr const char* kNoEstimator = kMeanName;  ///< the film is the image
 
 /// Throws Error(kUsage) for an unknown name, listing the known ones; for an option that the estimator does not have,
 /// listing those that have it; and for values out of range.
@@ -50,5 +53,11 @@ std::vector<std::string> estimators_with_option(const std::string& option);
 
 /// The estimator with the denoising that the texts describe. Throws Error(kUsage) if it cannot be denoised.
 Estimator with_denoising(const Estimator& base, const DenoisingChoice& choice);
+
+/// The value of `denoise` for an estimator if it was not given: auto for the default, none for those that are named.
+std::string usual_denoising(const std::string& estimator);
+/// What the default means for a pair of images (`is_pair`) or for independent samples alone, with its options and
+/// denoising. Throws Error(kUsage) like make_estimator() and with_denoising().
+Estimator make_default_estimator(bool is_pair, const OptionValues& values, const DenoisingChoice& choice);
 
 }  // namespace covary

@@ -14,6 +14,7 @@
 #include "denoising/layers.h"
 #include "denoising/mixture.h"
 #include "denoising/parts_mixture.h"
+#include "estimators/mean.h"
 #include "risk/held_out_bias.h"
 #include "risk/held_out_error.h"
 #include "risk/image_risk.h"
@@ -28,8 +29,8 @@ struct ModeSettings {
   const char* name;
   PartsWeighting weighting;
 };
-constexpr ModeSettings kModes[] = {{DenoiseMode::kNone, "none", {1, 0, false}},
-                                   {DenoiseMode::kAuto, "auto", {1, 1, false}},
+constexpr ModeSettings kModes[] = {{DenoiseMode::kNone, DenoisingChoice::kNone, {1, 0, false}},
+                                   {DenoiseMode::kAuto, DenoisingChoice::kAuto, {1, 1, false}},
                                    {DenoiseMode::kBias, "bias", {4, 0, true}},
                                    {DenoiseMode::kBalanced, "balanced", {2, 0, true}},
                                    {DenoiseMode::kError, "error", {1, 1, false}}};
@@ -267,6 +268,14 @@ MixedDenoising denoise_frame(DenoisingParts parts, const std::vector<CandidateMa
 Run run_of_pair(const Estimator& base, const MixedDenoisingOptions& options, bool with_oidn) {
   return [=](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
     check_guides(settings.guides);
+    if (std::min(crn.groups, independent.groups) < 2 * base.fewest_groups) {
+      MixedDenoising out;
+      out.result = base.apply(crn, independent, settings);
+      out.result.note = fmt::format(
+          "with fewer than {} groups denoised images cannot be judged: the picture is that of {} alone",
+          2 * base.fewest_groups, base.text);
+      return out;
+    }
     std::vector<CandidateMaker> makers = {filtered_candidates(settings.guides)};
     if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn));
     return denoise_frame(parts_of_pair(base, crn, independent, settings), makers, options, settings, {});
@@ -336,6 +345,12 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
     return stages;
   };
   return estimator;
+}
+
+Estimator make_mixture(Settings& options) {
+  Estimator mean = make_none(options);
+  mean.summary = "the mean, with denoised images mixed in";
+  return mean;
 }
 
 void declare(Settings& s, DenoisingChoice& v, bool is_all) {

@@ -53,12 +53,18 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
 /// Whether with_denoising() takes the estimator as base.
 bool can_be_denoised(const Estimator& estimator);
 
+/// The mean with denoised images mixed in: covary's default.
+inline constexpr const char* kMixture = "mixture";
+/// What it denoises, with these options. Throws Error(kUsage) listing everything wrong with them.
+Estimator make_mixture(Settings& options);
+
 /// MixedDenoisingOptions as text, as on the command line.
 struct DenoisingChoice {
-  std::string mode = "none";  ///< one of denoise_mode_names()
+  static constexpr const char *kNone = "none", *kAuto = "auto";
+  std::string mode = kNone;  ///< one of denoise_mode_names()
   std::string oidn;           ///< a library or its folder; "": search for it, "off": do not use it
   MixingHistory history;      ///< MixedDenoisingOptions::history; not an option
-  bool denoises() const { return mode != "none"; }
+  bool denoises() const { return mode != kNone; }
   bool uses_oidn() const { return denoises() && oidn != "off"; }
 };
 /// `is_all`: the caller has no other use for Open Image Denoise, so `oidn` without `denoise` is an error.

@@ -61,7 +61,7 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
   const bool needs_variance = options.penalty == Penalty::kSample || options.std_error || options.residual_correction ||
                               options.sample_fraction > 0;
   check_inputs(crn, independent, 3, needs_variance ? 2 : 1, problems);
-  throw_if_any("iicv", problems);
+  throw_if_any(kIicv, problems);
 
   EstimatorResult result;
   const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
@@ -140,7 +140,7 @@ Estimator make_iicv(Settings& parameters) {
   Estimator estimator;
   estimator.adaptive =
       ask_for_adaptive(p, standard, "The CRN pass decides how many independent samples each pixel gets", problems);
-  throw_if_any("iicv", problems);
+  throw_if_any(kIicv, problems);
 
   estimator.summary = "imperfect image-space control variates";
   estimator.predicts_error = true;

@@ -84,6 +84,7 @@ int iicv_reach(const IicvOptions& options);
 /// Approximate memory of iicv() beyond its input, including its result: bytes per pixel.
 double iicv_bytes_per_pixel(const IicvOptions& options);
 
+inline constexpr const char* kIicv = "iicv";
 /// The estimator `iicv` with these options. Throws Error(kUsage) listing everything wrong with them.
 Estimator make_iicv(Settings& options);
 

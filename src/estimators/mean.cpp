@@ -73,7 +73,7 @@ Estimator make_none(Settings& parameters) {
   std::vector<std::string> problems;
   estimator.adaptive = ask_for_adaptive(
       p, standard, "A first pass decides how many samples each pixel gets; if denoised, it is averaged in", problems);
-  throw_if_any("none", problems);
+  throw_if_any(kMeanName, problems);
   estimator.passes = EstimatorPasses::kAny;
   estimator.summary = "the mean";
   estimator.predicts_error = true;

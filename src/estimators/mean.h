@@ -21,6 +21,7 @@ struct Estimator;
 /// infinite with fewer than two samples.
 EstimatorResult mean_of_groups(const GroupedImage& image);
 
+inline constexpr const char* kMeanName = "none";
 /// The estimator `none` with these options. Throws Error(kUsage) listing everything wrong with them.
 Estimator make_none(Settings& options);
 

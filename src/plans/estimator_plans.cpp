@@ -73,7 +73,7 @@ Plan plan_of(const Estimator& estimator) {
 
 Plan plain_plan(Sampling sampling, std::optional<int> groups) {
   Plan plan;
-  plan.name = plan.estimator = "none";
+  plan.name = plan.estimator = kMeanName;
   plan.film_is_image = plan.predicts_error = plan.splits_layers = true;
   plan.has_crn_pass = sampling == Sampling::kCrn;
   plan.takes_training = !plan.has_crn_pass;

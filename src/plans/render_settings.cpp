@@ -82,11 +82,11 @@ FilterSettings filter_named(const std::string& name) {
 void declare(Settings& s, RenderSettings& v) {
   declare_goal(s, v.request);
   s.one_of("integrator", v.integrator, integrator_names(), "Integrator instead of the scene's", kBasicSamples);
-  const bool is_named = s.is_given("estimator") || s.is_given("sampling");
+  if (s.is_given("sampling")) v.estimator = kNoEstimator;
   s.one_of("estimator", v.estimator, estimator_names(),
-           "How samples become the image; none: their mean. If given, nothing is denoised without `denoise`",
+           "How samples become the image; none: their mean. Others than the default are denoised only by `denoise`",
            kBasicPasses);
-  v.denoising.mode = is_named ? "none" : "auto";
+  v.denoising.mode = usual_denoising(v.estimator);
   declare(s, v.denoising, false);
   s.group("Rendering");
   s.text_as("resolution", v, "WIDTHxHEIGHT", read_resolution, "Size of the full frame; default: the scene's",
@@ -106,7 +106,7 @@ Plan render_plan(const RenderSettings& settings, const OptionValues& of_estimato
     throw Error(ErrorCode::kUsage,
                 "`split` auto is for the mean of independent samples that is denoised (`denoise`), "
                 "without `adaptive`");
-  return split_plan(estimator, with_denoising(make_estimator("iicv", {}), settings.denoising), settings.passes.groups);
+  return split_plan(estimator, with_denoising(make_estimator(kIicv, {}), settings.denoising), settings.passes.groups);
 }
 
 RenderRequest request_of(const RenderSettings& settings, const LoadedScene& scene) {
@@ -177,10 +177,11 @@ std::vector<std::string> pass_words(OptionValues given, const OptionValues& of_i
   add(options_of_estimator(name), of_estimator);
   for (const auto& [option, value] : of_integrator) words.insert(words.end(), {"--" + option, value});
   const bool is_plain_pair = estimator.passes == EstimatorPasses::kPair && !estimator.adaptive;
-  const bool is_denoised_mean = estimator.passes == EstimatorPasses::kAny && settings.denoising.denoises();
+  const bool is_mean = estimator.passes == EstimatorPasses::kAny;
+  const bool is_denoised_mean = is_mean && settings.denoising.denoises();
   // These passes depend on what is denoised.
   if (settings.passes.chooses_split) words.push_back(estimator_of(settings, of_estimator).text);
-  words.push_back(is_plain_pair ? "pair" : is_denoised_mean ? "groups" : name);
+  words.push_back(is_plain_pair ? "pair" : is_denoised_mean ? "groups" : is_mean ? kNoEstimator : name.c_str());
   return words;
 }
 

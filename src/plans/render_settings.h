@@ -20,11 +20,10 @@ struct RenderSettings {
   int width = 0, height = 0;  ///< replaces the scene's; 0: the scene's
   RenderRequest request;      ///< as far as options determine it
   PassChoice passes;
-  std::string estimator = kNoEstimator;
+  std::string estimator = kDefaultEstimator;
   DenoisingChoice denoising;
 };
-/// The default is the mean of independent samples with `denoise` auto. An estimator or kind of sampling that is named
-/// explicitly is used as it is, without denoising unless requested.
+/// An estimator or kind of sampling that is named explicitly is used as it is, without denoising unless requested.
 void declare(Settings& settings, RenderSettings& render);
 
 /// The estimator with its options, denoised as the settings say. Throws Error(kUsage).

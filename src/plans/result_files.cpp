@@ -44,7 +44,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
                             film_key::kCommand, film_key::kFrame, film_key::kTimeChoice})
       if (film.attributes.count(key)) attributes[std::string("covary:") + key] = film.attributes.at(key);
     const bool estimated = !result.image.estimate.data.empty();
-    attributes["covary:estimator"] = estimated ? plan.estimator : "none";
+    attributes["covary:estimator"] = estimated ? plan.estimator : kMeanName;
     if (estimated && !plan.network.empty()) attributes["covary:denoiser"] = plan.network;
     if (result.interrupted) attributes[std::string("covary:") + film_key::kComplete] = "false";
     attributes["covary:samples"] = fmt::format("{:g}", result.samples_per_pixel());
