@@ -76,17 +76,9 @@ RenderSettings settings_of(const Options& values) {
 }
 
 Plan plan_of(const RenderSettings& settings, const Choice& choice) {
-  Plan plan = render_plan(settings, choice.of_estimator);
   if (choice.films_only && settings.request.splits_layers())
     throw Error(ErrorCode::kUsage, "layers: films_only=True makes no image that they would be parts of");
-  if (choice.films_only) {
-    plan.estimate = [](std::span<const Pass>, int, int, const Beside&) { return EstimatorResult(); };
-    plan.estimate_memory = {};
-    plan.network.clear();
-    plan.estimator = kNoEstimator;
-    plan.predicts_error = false;
-  }
-  return plan;
+  return render_plan(settings, choice.of_estimator);
 }
 
 /// Adds the first samples of a pass that count as black, with the commands that replay them.
@@ -145,6 +137,7 @@ nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Opti
   const RenderSettings settings = settings_of(choice.values);
   const Plan plan = plan_of(settings, choice);
   RenderRequest request = request_of(settings, scene);
+  request.films_only = choice.films_only;
   request.attributes[film_key::kVersion] = COVARY_VERSION;
   if (request.load_training.empty()) take_training(scene, request);
   std::vector<std::string> warnings(scene.warnings);
@@ -166,8 +159,8 @@ nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Opti
   given.insert(of_integrator.begin(), of_integrator.end());
   if (const std::string text = missing_network(settings.denoising); !text.empty() && !choice.films_only)
     warnings.push_back(as_arguments(text));
-  nb::dict made = dict_of(std::move(result), plan.estimator, warnings, given);
-  made["network"] = plan.network;
+  nb::dict made = dict_of(std::move(result), choice.films_only ? kNoEstimator : plan.estimator->text, warnings, given);
+  made["network"] = choice.films_only ? "" : plan.estimator->network;
   return made;
 }
 
@@ -191,21 +184,21 @@ nb::dict image_of_films(const Options& values, const Options& of_estimator, nb::
       [&](WorkState& state) {
         const Stopwatch watch;
         Beside beside;
-        if (plan.reads_guides) beside.guides = guides_among(result.aovs);
+        if (plan.estimator->reads_guides) beside.guides = guides_among(result.aovs);
         const auto estimate = [&] {
           result.image = plan.estimate(result.passes, 0, result.passes[0].film.height(), beside);
           finish(result.image, nullptr);
         };
         if (!run_stoppable(state, estimate)) return;
-        result.predicted = predicted_error(result.image, result.samples_per_pixel(), plan.reliable_samples);
+        result.predicted = predicted_error(result.image, result.samples_per_pixel(), plan.estimator->reliable_samples);
         if (result.predicted) result.predicted_blocks = predicted_blocks(result.image);
-        if (plan.film_is_image) result.image.estimate = {};
+        if (plan.film_is_image()) result.image.estimate = {};
         result.seconds.estimate = watch.seconds();
       },
       nb::none());
   result.complete = true;
-  nb::dict made = dict_of(std::move(result), plan.estimator, {}, values);
-  made["network"] = plan.network;
+  nb::dict made = dict_of(std::move(result), plan.estimator->text, {}, values);
+  made["network"] = plan.estimator->network;
   return made;
 }
 

@@ -328,6 +328,7 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
   if (is_mean(base)) estimator.passes = EstimatorPasses::kIndependent, estimator.fewest_groups = 1;
   estimator.splits_layers = is_mean(base) && !base.adaptive;
   if (AdaptiveSampling* adaptive = estimator.adaptive ? &*estimator.adaptive : nullptr) {
+    estimator.memory.of_halves_per_group = 3 * sizeof(float);  // both passes in one film
     adaptive->counts.tops_up = true;
     if (!adaptive->names_allocation) adaptive->counts.allocation = Allocation::kDenoised;
   }

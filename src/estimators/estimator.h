@@ -121,6 +121,9 @@ struct Estimator {
   std::string film_settings;
   /// Problems with this number of samples per pixel; empty if there are none.
   std::function<std::vector<std::string>(uint32_t samples)> check_samples;
+
+  /// The film of a single pass holds the image.
+  bool image_is_film() const { return passes == EstimatorPasses::kAny || passes == EstimatorPasses::kSamples; }
 };
 
 /// Estimator::explain for an estimator of grouped images whose options include a probe.

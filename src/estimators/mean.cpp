@@ -65,8 +65,10 @@ EstimatorResult mean_of_groups(const GroupedImage& image) {
 }
 
 Estimator make_none(Settings& parameters) {
+  constexpr double kMomentsAndMask = 7 * sizeof(float);  // per pixel, for the error
   Settings& p = parameters;
   Estimator estimator;
+  estimator.name = estimator.text = kMeanName;
   AdaptiveSampling standard;
   standard.least_min_spp = 1;  // a mean needs a sample
   standard.counts.first_pass_counts = false;
@@ -77,6 +79,8 @@ Estimator make_none(Settings& parameters) {
   estimator.passes = EstimatorPasses::kAny;
   estimator.summary = "the mean";
   estimator.predicts_error = true;
+  estimator.splits_layers = !estimator.adaptive;
+  estimator.memory.of_halves = kMomentsAndMask, estimator.memory.groups_for_halves = 2;
   return estimator;
 }
 

@@ -168,7 +168,6 @@ void set_estimate(const Estimator& estimator, Plan& plan) {
     };
     return;
   }
-  plan.estimate_memory.of_halves_per_group = 3 * sizeof(float);  // the joined film
   plan.estimate = [apply](std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside) {
     const Film film = joined(passes[0].film, passes[1].film);
     PairSettings settings;

@@ -29,9 +29,6 @@ PixelEstimate pixel_estimate(const PixelFunction& estimate, int dimensions) {
   };
 }
 
-/// Memory in addition to a film of groups: moments and a mask.
-constexpr double kBytesOfMean = 7 * sizeof(float);
-
 EstimatorResult mean_of_first(std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside) {
   const GroupedImage groups = rows_of(passes[0].film, first_row, n_rows);
   EstimatorResult mean = mean_of_groups(groups);
@@ -60,25 +57,16 @@ Shares shares_of(const Estimator& estimator, const PassChoice& choice) {
 
 Plan plan_of(const Estimator& estimator) {
   Plan plan;
-  plan.name = estimator.name;
-  plan.estimator = estimator.text;
-  plan.network = estimator.network;
-  plan.predicts_error = estimator.predicts_error;
-  plan.reliable_samples = estimator.reliable_samples;
-  plan.estimate_memory = estimator.memory;
-  plan.reads_guides = estimator.reads_guides;
-  plan.splits_layers = estimator.splits_layers;
+  plan.estimator = std::make_shared<const Estimator>(estimator);
   return plan;
 }
 
 Plan plain_plan(Sampling sampling, std::optional<int> groups) {
-  Plan plan;
-  plan.name = plan.estimator = kMeanName;
-  plan.film_is_image = plan.predicts_error = plan.splits_layers = true;
+  Settings defaults;
+  Plan plan = plan_of(make_none(defaults));
   plan.has_crn_pass = sampling == Sampling::kCrn;
   plan.takes_training = !plan.has_crn_pass;
   plan.estimate = mean_of_first;
-  plan.estimate_memory.of_halves = kBytesOfMean, plan.estimate_memory.groups_for_halves = 2;
   Phase phase;
   phase.passes = [=](const PlanState& state) {
     PassPlan pass;
@@ -97,7 +85,6 @@ Plan plain_plan(Sampling sampling, std::optional<int> groups) {
 
 Plan independent_plan(const Estimator& estimator, std::optional<int> groups) {
   Plan plan = plan_of(estimator);
-  plan.predicts_error = true;
   plan.groups_follow_speed = !groups;
   plan.estimate = [apply = estimator.apply](std::span<const Pass> passes, int first_row, int n_rows,
                                             const Beside& beside) {
@@ -122,7 +109,6 @@ Plan independent_plan(const Estimator& estimator, std::optional<int> groups) {
 
 Plan samples_plan(const Estimator& estimator) {
   Plan plan = plan_of(estimator);
-  plan.film_is_image = plan.fixed_samples = true;
   plan.estimate = mean_of_first;
   Phase phase;
   phase.passes = [=](const PlanState& state) {

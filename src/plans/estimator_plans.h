@@ -37,7 +37,7 @@ Plan pair_plan(const Estimator& estimator, const PassChoice& choice = {});
 /// The one of these plans that the estimator needs.
 Plan estimator_plan(const Estimator& estimator, const PassChoice& choice = {});
 
-/// A plan without phases and estimate, with the estimator's properties.
+/// A plan without phases and estimate.
 Plan plan_of(const Estimator& estimator);
 
 }  // namespace covary

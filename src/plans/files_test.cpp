@@ -275,8 +275,9 @@ TEST(Estimate, GetsAllAuxiliaryImagesAsGuides) {
   const TemporaryFolder folder;
   RenderRequest request = request_of(24);
   request.output = folder.file("a.exr");
-  Plan plan = average_plan();
-  plan.reads_guides = true;
+  Estimator guided_average = average_estimator();
+  guided_average.reads_guides = true;
+  Plan plan = pair_plan(guided_average);
   std::map<std::string, std::vector<float>> guided;
   plan.estimate = [&, make = plan.estimate](std::span<const Pass> passes, int row, int n_rows, const Beside& beside) {
     guided = {{"Albedo", beside.guides.albedo->data},
@@ -355,28 +356,29 @@ TEST(FolderLock, NamesTheProcessThatHoldsTheFolder) {
 TEST(Memory, CountsFilmsAuxiliaryImagesAndEstimator) {
   const LoadedScene scene = load_sized(kRoom, 100, 50);
   RenderRequest request = request_of(48);
-  Plan plan = average_plan();
-  plan.estimate_memory.always = 100;
-  const RenderMemory memory = render_memory(scene, plan, request);
+  Estimator average = average_estimator();
+  const auto memory_now = [&] { return render_memory(scene, pair_plan(average), request); };
+  average.memory.always = 100;
+  const RenderMemory memory = memory_now();
   EXPECT_EQ(memory.films, 2 * 5000 * (12 * 12 + 4));
   EXPECT_EQ(memory.estimate, 5000 * (100 + 12));
-  plan.estimate_memory.of_halves = 20, plan.estimate_memory.of_halves_per_group = 7;
-  plan.estimate_memory.groups_for_halves = 12;
-  EXPECT_EQ(render_memory(scene, plan, request).estimate, 5000 * (100 + 20 + 12 * 7 + 12));
-  plan.estimate_memory.groups_for_halves = 13;
-  EXPECT_EQ(render_memory(scene, plan, request).estimate, 5000 * (100 + 12));
+  average.memory.of_halves = 20, average.memory.of_halves_per_group = 7;
+  average.memory.groups_for_halves = 12;
+  EXPECT_EQ(memory_now().estimate, 5000 * (100 + 20 + 12 * 7 + 12));
+  average.memory.groups_for_halves = 13;
+  EXPECT_EQ(memory_now().estimate, 5000 * (100 + 12));
   request.aovs = true;
-  EXPECT_EQ(render_memory(scene, plan, request).films - memory.films, 5000 * 60);
+  EXPECT_EQ(memory_now().films - memory.films, 5000 * 60);
   request.crop = CropWindow{0, 0, 10, 10};
   EXPECT_EQ(render_memory(scene, plain_plan(Sampling::kIndependent), request).films, 100 * (12 + 4 + 60));
 }
 
 TEST(Memory, MoreThanTheLimitIsRefusedBeforeItIsTaken) {
   const LoadedScene scene = load_sized(kRoom);
-  Plan plan = average_plan();
-  plan.estimate_memory.always = memory_limit();
-  EXPECT_TRUE(
-      contains(message_of([&] { render(scene, plan, request_of(24)); }, ErrorCode::kUsage), "40 x 30 pixels need "));
+  Estimator average = average_estimator();
+  average.memory.always = memory_limit();
+  EXPECT_TRUE(contains(message_of([&] { render(scene, pair_plan(average), request_of(24)); }, ErrorCode::kUsage),
+                       "40 x 30 pixels need "));
 }
 
 }  // namespace

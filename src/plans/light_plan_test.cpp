@@ -281,7 +281,6 @@ TEST(LightPlan, TheLightPassComesWithTheLastPhase) {
     passes[0].settings.spp = SampleTarget(map);
   };
   plan.phases.insert(plan.phases.begin(), first);
-  plan.film_is_image = false;
   plan.estimate = [](std::span<const Pass> passes, int first_row, int n_rows, const Beside&) {
     EXPECT_EQ(passes.size(), 2u);
     return mean_of_groups(rows_of(passes[1].film, first_row, n_rows));

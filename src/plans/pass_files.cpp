@@ -127,7 +127,7 @@ constexpr const char* kWaysOut =
 }  // namespace
 
 bool output_is_film(const Plan& plan, const RenderRequest& request) {
-  return plan.film_is_image && !plan.traces_light && request.passes.empty();
+  return plan.film_is_image() && !plan.traces_light && request.passes.empty();
 }
 
 fs::path passes_folder(const RenderRequest& request) {

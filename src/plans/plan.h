@@ -85,7 +85,7 @@ struct PlanState {
   /// With a time limit: the time left for everything that follows when a phase's targets are set.
   std::optional<double> seconds_left;
   std::vector<Pass> passes;  ///< of this phase and all earlier ones, in the plan's order
-  Guides guides;             ///< of the whole window, for the targets of the last phase, if Plan::reads_guides
+  Guides guides;             ///< of the whole window, for the targets of the last phase, if Estimator::reads_guides
 
   /// The pass with this name and number. Throws Error(kInternal) if none has begun.
   const Pass& pass(const std::string& name, uint32_t number = 0) const;
@@ -105,33 +105,27 @@ struct Phase {
 
 /// What an estimate may read in addition to the films, for its rows.
 struct Beside {
-  Guides guides;              ///< if Plan::reads_guides
-  std::vector<Layer> layers;  ///< if Plan::splits_layers; empty if none were requested
+  Guides guides;              ///< if Estimator::reads_guides
+  std::vector<Layer> layers;  ///< if Estimator::splits_layers; empty if none were requested
 };
 
 /// If the integrator traces light, render() adds a pass "light" to those of the last phase; it advances with them, and
 /// its film is added to the image (light_plan.h). Phases and estimate() only see the passes of camera samples.
 struct Plan {
-  std::string name;       ///< of the estimator, for messages
-  std::string estimator;  ///< the same with options, for the image's attribute
-  std::string network;    ///< Estimator::network
+  std::shared_ptr<const Estimator> estimator;  ///< what the plan renders for
   std::vector<Phase> phases;
   /// Computes rows first_row … first_row + n_rows - 1 of the image from the current films. Its cost depends on the
   /// size, not on sample counts.
   std::function<EstimatorResult(std::span<const Pass>, int first_row, int n_rows, const Beside& beside)> estimate;
-  EstimatorMemory estimate_memory;  ///< working memory of estimate() besides the films
-  bool takes_unfinished = false;    ///< estimate() works even if some pixels have no samples yet
-  bool reads_guides = false;        ///< estimate() reads albedo and normal, which are rendered for it
-  bool splits_layers = false;       ///< estimate() computes EstimatorResult::layers from Beside::layers
-  bool film_is_image = false;       ///< the film of the only pass is the result; estimate() only provides its error
-  bool takes_training = false;      ///< the integrator's training samples are part of the image
-  bool has_crn_pass = false;        ///< some pass uses common random numbers
-  bool traces_light = false;        ///< set by render(): there is a light pass
-  bool predicts_error = false;      ///< estimate() gives a standard error
-  uint32_t reliable_samples = 0;    ///< Estimator::reliable_samples
-  bool fixed_samples = false;       ///< the number of samples must be known in advance: no time or error limits
+  bool takes_unfinished = false;  ///< estimate() works even if some pixels have no samples yet
+  bool takes_training = false;    ///< the integrator's training samples are part of the image
+  bool has_crn_pass = false;      ///< some pass uses common random numbers
+  bool traces_light = false;      ///< set by render(): there is a light pass
   /// With a time limit, the speed is measured before the passes begin, so that there are no more groups than samples.
   bool groups_follow_speed = false;
+
+  /// The film of the only pass is the result; estimate() only provides its error.
+  bool film_is_image() const { return phases.size() == 1 && estimator->image_is_film(); }
 };
 
 /// The passes without the light pass, which is the last if there is one.

@@ -61,7 +61,8 @@ RenderResult PlanRun::run() {
   try {
     result_.interrupted = !render_to_limits();
     result_.complete = complete() && (!in_rounds() || state_.budget >= largest_budget(scene_, request_));
-    if (result_.interrupted && can_estimate() && (!plan_.film_is_image || film_has_errors())) {
+    if (result_.interrupted && can_estimate() && !request_.films_only &&
+        (!plan_.film_is_image() || film_has_errors())) {
       keep_films_before_more();
       estimate();
     }

@@ -73,11 +73,11 @@ bool PlanRun::estimate() {
     if (!image.kept_samples[i].data.empty()) result_.aovs[kKeptSamples[i]] = std::move(image.kept_samples[i]);
   double samples = 0;
   for (const Pass& pass : camera_passes(films())) samples += pass.film.mean_count();
-  result_.predicted = predicted_error(image, samples, plan_.reliable_samples);
+  result_.predicted = predicted_error(image, samples, plan_.estimator->reliable_samples);
   if (result_.predicted) result_.predicted_blocks = predicted_blocks(image);
   if (request_.until > 0 && !result_.predicted)
     throw Error(ErrorCode::kUsage, "an error can only be predicted from 2 or more groups");
-  if (plan_.film_is_image) image.estimate = {};
+  if (plan_.film_is_image()) image.estimate = {};
   result_.image = std::move(image);
   estimate_seconds_ = watch.seconds();
   result_.seconds.estimate += *estimate_seconds_;
@@ -87,7 +87,7 @@ bool PlanRun::estimate() {
 /// Predicted duration of the estimate in seconds, from a trial on rows in the middle: it depends on sizes, not on
 /// samples.
 double PlanRun::time_estimate() {
-  if (plan_.film_is_image) return 0;  // a mean
+  if (plan_.film_is_image() || request_.films_only) return 0;  // at most a mean
   const Stopwatch watch;
   const int height = window_.height, n_rows = std::min(height, std::max(kTrialRows, height / 8));
   run_stoppable(callbacks_.stop, [&] { estimate_rows((height - n_rows) / 2, n_rows); });
@@ -165,7 +165,7 @@ void PlanRun::write_files() {
   result_.integrator = state_.integrator;
   result_.passes = std::move(state_.passes);
   if (result_.interrupted && result_.samples_per_pixel() == 0) return;
-  if (plan_.film_is_image && has_training())
+  if (plan_.film_is_image() && has_training())
     result_.image.estimate = with_training(result_.passes[0].film, result_.training);
   if (request_.path_lengths && !result_.interrupted) {
     keep_films_before_more();

@@ -29,6 +29,7 @@ struct RenderRequest {
   double seconds = 0;            ///< > 0: limit for everything but loading
   double until = 0;              ///< > 0: add samples until the predicted relMSE is this small
   bool until_in_blocks = false;  ///< `until` means predicted_blocks() of predicted_error.h, not the whole image
+  bool films_only = false;       ///< only the passes: no image is made of their films
   bool aovs = false;             ///< also the images Albedo, N and P
   /// At most, per pixel of the auxiliary images (integrators/aov.h), at least 1. Fewer with `seconds`, if need be.
   uint32_t aov_samples = 64;

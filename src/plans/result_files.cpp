@@ -26,7 +26,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
     for (const char* name : kAuxiliaryImages) aovs.erase(name);
   aovs.insert(request.beside.begin(), request.beside.end());
   Film& last = result.passes[camera_passes(result.passes).size() - 1].film;
-  if (plan.film_is_image) {
+  if (plan.film_is_image()) {
     const Pass* light = light_pass(result.passes);
     Film sum;
     if (light) sum = sum_of_films(last, light->film);
@@ -44,8 +44,8 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
                             film_key::kCommand, film_key::kFrame, film_key::kTimeChoice})
       if (film.attributes.count(key)) attributes[std::string("covary:") + key] = film.attributes.at(key);
     const bool estimated = !result.image.estimate.data.empty();
-    attributes["covary:estimator"] = estimated ? plan.estimator : kMeanName;
-    if (estimated && !plan.network.empty()) attributes["covary:denoiser"] = plan.network;
+    attributes["covary:estimator"] = estimated ? plan.estimator->text : kMeanName;
+    if (estimated && !plan.estimator->network.empty()) attributes["covary:denoiser"] = plan.estimator->network;
     if (result.interrupted) attributes[std::string("covary:") + film_key::kComplete] = "false";
     attributes["covary:samples"] = fmt::format("{:g}", result.samples_per_pixel());
     if (aovs.contains("Albedo")) attributes[std::string("covary:") + film_key::kCleanGuides] = "true";

@@ -128,12 +128,13 @@ void set_last_targets(const Method& method, const PlanState& state, std::span<Pa
 
 Plan split_plan(const Estimator& mean, const Estimator& pair, std::optional<int> groups) {
   const Method method{mean, pair, groups};
-  Plan plan = independent_plan(mean, groups);
-  plan.estimator += " --split auto";
+  Estimator estimator = mean;
+  estimator.text += " --split auto";
+  estimator.splits_layers = false;
+  estimator.memory.always = std::max(mean.memory.always, pair.memory.always);
+  estimator.memory.of_halves_per_group = 2 * 3 * sizeof(float);  // the films of both phases
+  Plan plan = independent_plan(estimator, groups);
   plan.has_crn_pass = plan.takes_unfinished = true;  // the first phase has samples in all pixels
-  plan.splits_layers = false;
-  plan.estimate_memory.always = std::max(mean.memory.always, pair.memory.always);
-  plan.estimate_memory.of_halves_per_group = 2 * 3 * sizeof(float);  // the films of both phases
   plan.estimate = [method](std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside) {
     return estimate(method, passes, first_row, n_rows, beside);
   };

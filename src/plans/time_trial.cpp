@@ -71,9 +71,9 @@ double PlanRun::end_of_band(int n_rows, std::span<const PassPlan> plans) {
   if (needs_aovs())
     for (const char* name : kAuxiliaryImages) result.aovs[name] = made_up_image(band.width, n_rows);
   Beside beside;
-  if (plan_.reads_guides) beside.guides = guides_among(result.aovs);
+  if (plan_.estimator->reads_guides) beside.guides = guides_among(result.aovs);
   const Stopwatch watch;
-  if (!plan_.film_is_image)
+  if (!plan_.film_is_image() && !request_.films_only)
     run_stoppable(callbacks_.stop, [&] {
       result.image = plan_.estimate(result.passes, 0, n_rows, beside);
       finish(result.image, nullptr);

@@ -27,8 +27,8 @@ inline RenderRequest request_of(uint32_t spp) {
   return request;
 }
 
-/// A CRN and an independent pass; the image is the average of the first group of each.
-inline Plan average_plan() {
+/// Of a CRN and an independent image: the average of the first group of each.
+inline Estimator average_estimator() {
   Estimator method;
   method.name = method.text = "average";
   method.fewest_groups = 3;
@@ -41,8 +41,9 @@ inline Plan average_plan() {
           result.estimate.pixel(x, y)[c] = 0.5f * (crn.pixel(x, y)[c] + independent.pixel(x, y)[c]);
     return result;
   };
-  return pair_plan(method);
+  return method;
 }
+inline Plan average_plan() { return pair_plan(average_estimator()); }
 
 /// Stops a render after a number of tiles.
 struct StopAfter {
