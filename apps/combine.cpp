@@ -75,7 +75,8 @@ void check_explain(const CombineOptions& o, const Estimator& estimator, const Gr
   const CropWindow& window = file.place().window;
   const int x = o.explain->x - window.x, y = o.explain->y - window.y;
   if (estimator.reads_guides)
-    throw Error(ErrorCode::kUsage, "--explain: a pixel that is denoised is not a sum of control variates; see --estimator iicv");
+    throw Error(ErrorCode::kUsage,
+                "--explain: a pixel that is denoised is not a sum of control variates; see --estimator iicv");
   if (!estimator.explain)
     throw Error(ErrorCode::kUsage, "--explain: " + o.estimator + " has no control variates with coefficients");
   if (x < 0 || y < 0 || x >= window.width || y >= window.height)
@@ -142,7 +143,8 @@ struct GuideImages {
 GuideImages read_guides(const CombineOptions& o, const Estimator& estimator, const GroupedFile& file) {
   if (o.guides.empty()) return {};
   if (!estimator.reads_guides)
-    throw Error(ErrorCode::kUsage, "--guides is an option of --denoise auto, bias, balanced and error, not of " + estimator.name);
+    throw Error(ErrorCode::kUsage,
+                "--guides is an option of --denoise auto, bias, balanced and error, not of " + estimator.name);
   const ImageInfo info = inspect_image(o.guides);
   const auto own = [&](const char* name) -> std::optional<Image> {  // guides that `render` wrote
     const bool is_there = std::any_of(info.channels.begin(), info.channels.end(),

@@ -4,6 +4,7 @@
 #include "denoising/denoise.h"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -27,6 +28,7 @@
 #include "filters/stray_values.h"
 #include "frame_files.h"
 #include "guide_layer.h"
+#include "json_output.h"
 #include "metrics/provenance.h"
 #include "numbers.h"
 #include "progress.h"
@@ -42,7 +44,7 @@ constexpr const char* kNetwork = "oidn";
 
 struct Options {
   std::vector<std::string> inputs;
-  std::string output, layer, mode, oidn, albedo, normal;
+  std::string output, layer, mode, oidn, albedo, normal, json;
   std::vector<std::string> layers;
   bool no_guides = false, clean_guides = false, check = false, quiet = false, force = false, overwrite = false;
   FrameOptions of_frames;
@@ -160,6 +162,28 @@ void denoise_by_network(const Options& o, const GuideLayers& guides, ProgressLin
                watch.seconds());
 }
 
+void write_statistics(const Options& o, const CombineRequest& request, const CombinedImage& combined,
+                      const DenoisingChoice& choice) {
+  if (o.json.empty()) return;
+  nlohmann::ordered_json json{
+      {"output", o.output},
+      {"estimator", request.estimator.text},
+      {"width", request.independent.width},
+      {"height", request.independent.height},
+      {"independent_groups", request.independent.groups},
+      {"nonfinite_pixels", combined.image.nonfinite_pixels},
+      {"seconds", {{"read_and_check", combined.check_seconds}, {"estimate", combined.estimate_seconds}}}};
+  if (combined.predicted) {
+    add_prediction(*combined.predicted, json);
+    json["independent_predicted_relmse"] =
+        predicted_relmse_of_mean(request.independent, std::max(1, rows_in_memory(request)));
+  }
+  add_risks(combined.image.risks, json);
+  add_network(request.estimator.network, combined.image.network_runs, choice, json);
+  if (!combined.image.note.empty()) json["note"] = combined.image.note;
+  write_text_output(o.json, json_text(json));
+}
+
 void denoise_by_mixture(const Options& o, const GroupedFile& file, const GuideLayers& guides, ProgressLine& progress) {
   CombineRequest request;
   request.independent = source_of(file);
@@ -185,6 +209,7 @@ void denoise_by_mixture(const Options& o, const GroupedFile& file, const GuideLa
   if (!request.estimator.network.empty()) attributes["covary:denoiser"] = request.estimator.network;
   if (file.samples() > 0) attributes["covary:samples"] = fmt::to_string(file.samples());
   write(o, file.place(), attributes, combined.image, std::move(combined.layers), file.source(), progress);
+  write_statistics(o, request, combined, choice);
   if (o.quiet) return;
   fmt::print(stderr, "{}: {} x {}, {} of {} groups, {}, in {:.2f} s\n", o.output, file.width(), file.height(),
              request.estimator.text, file.groups(), guides.text(), combined.check_seconds + combined.estimate_seconds);
@@ -215,6 +240,7 @@ void run_one(const Options& o) {
   Outputs outputs;
   outputs.reads(o.inputs);
   outputs.writes_result("-o", o.output, OutputKind::kFilm, "denoise", o.overwrite);
+  outputs.writes("--json", o.json, OutputKind::kText);
   ProgressLine progress(std::filesystem::path(o.inputs[0]).stem().string(), o.quiet);
   progress.begin("loading");
   const GuideLayers guides(o);
@@ -226,14 +252,19 @@ void run_one(const Options& o) {
                                                o.mode, o.inputs[0]));
   if (!o.layers.empty() && (!file || file->groups() < 2))
     throw Error(ErrorCode::kUsage, "--layers are denoised by a mixture, which needs a second render of another seed");
+  if (!o.json.empty() && (!file || file->groups() < 2))
+    throw Error(ErrorCode::kUsage, "--json tells the error, which needs a second render of another seed");
   if (!file || file->groups() < 2) return denoise_by_network(o, guides, progress);
   denoise_by_mixture(o, *file, guides, progress);
 }
 
 void run_sequence(const Options& o, const FramePatterns& patterns) {
+  if (!o.json.empty() && o.json != "-" && !is_frame_pattern(o.json))
+    throw Error(ErrorCode::kUsage, fmt::format("--json '{}': of frames, expected a name with '#', or -", o.json));
   for_each_frame(o.of_frames, patterns, !is_by_network(o), [&](int frame, std::shared_ptr<const History> history) {
     Options one = o;
     one.output = frame_name(o.output, frame);
+    if (is_frame_pattern(o.json)) one.json = frame_name(o.json, frame);
     for (std::string& path : one.inputs) path = frame_name(path, frame);
     one.history = std::move(history);
     run_one(one);
@@ -280,6 +311,7 @@ void add_denoise(CLI::App& app) {
   command->add_flag(
       "--clean-guides", o->clean_guides,
       "With --mode oidn, denoise the guides first: less error if they are noisy, in three times the time");
+  add_value(*command, "--json", o->json, kFileValue, "File for statistics of a mixture; '-': standard output");
   add_frame_options(*command, o->of_frames, "Denoise");
   add_overwrite_option(*command, o->overwrite);
   command->add_flag("--force", o->force, "Denoise even if the renders do not match");

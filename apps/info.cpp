@@ -14,9 +14,9 @@
 #include "io/load_scene.h"
 #include "io/scene_file.h"
 #include "json_output.h"
-#include "plans/render_settings.h"
 #include "plans/memory.h"
 #include "plans/render.h"
+#include "plans/render_settings.h"
 #include "settings/option_names.h"
 #include "value_names.h"
 
@@ -59,8 +59,10 @@ std::string describe_channels(const std::vector<ExrFile::Channel>& channels) {
 /// Memory of a render of the scene with default settings, by estimator.
 std::map<std::string, double> memory_of_renders(const LoadedScene& scene) {
   std::map<std::string, double> memory;
-  for (const char* name : {kDefaultEstimator, kNoEstimator})
-    memory[name] = render_memory(scene, render_plan(settings_from<RenderSettings>({{"estimator", name}}), {}), {}).total();
+  for (const char* name : {kDefaultEstimator, kNoEstimator}) {
+    const Plan plan = render_plan(settings_from<RenderSettings>({{"estimator", name}}), {});
+    memory[name] = render_memory(scene, plan, {}).total();
+  }
   return memory;
 }
 

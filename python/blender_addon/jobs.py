@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The steps behind the button: groups rendered by Cycles, and the program that combines them. Each step is started,
-polled until it has ended, and closed, so that the window stays responsive."""
+"""The steps behind the button: groups rendered by Cycles, and the program that makes a picture of them. Each step is
+started, polled until it has ended, and closed, so that the window stays responsive."""
 from __future__ import annotations
 
 import shutil
@@ -14,7 +14,7 @@ from typing import Any
 import bpy
 
 from . import program
-from ._cycles import GROUPS, Group, check, groups_of, kept_in_memory, settings
+from ._cycles import GROUPS, INDEPENDENT, PAIR, Group, check, groups_of, kept_in_memory, settings
 from .errors import UsageError
 
 
@@ -149,21 +149,24 @@ class Job:
     def __init__(self, scene: Any, named: str, animation: bool) -> None:
         """Raises UsageError for whatever would fail later."""
         choice = scene.covary
-        check(scene, choice.samples)
+        #: The default takes all samples independently; what is not denoised, or with little bias, half of them.
+        self.kinds = INDEPENDENT if choice.denoise == "auto" else PAIR
+        check(scene, choice.samples, kinds=self.kinds)
         self.scene, self.frames = scene, frames_of(scene, animation)
         self.program = program.find(named)
         program.check(self.program)
         self.samples, self.seed, self.denoise = choice.samples, choice.seed, choice.denoise
         check_places(scene, output_of(scene, self.frames[0]), bpy.app.tempdir)
-        self.total, self.done = len(self.frames) * (2 * GROUPS + 1), 0
+        self.groups = len(self.kinds) * GROUPS
+        self.total, self.done = len(self.frames) * (self.groups + 1), 0
         self.output, self.verdict = "", ""
         self.warnings: list[str] = []
 
     def text(self) -> str:
         """The current step, as text."""
-        picture, step = divmod(self.done, 2 * GROUPS + 1)
+        picture, step = divmod(self.done, self.groups + 1)
         frame = f"frame {self.frames[min(picture, len(self.frames) - 1)]}, " if len(self.frames) > 1 else ""
-        return frame + ("combining" if step == 2 * GROUPS else f"group {step + 1} of {2 * GROUPS}")
+        return frame + ("combining" if step == self.groups else f"group {step + 1} of {self.groups}")
 
     def steps(self) -> Iterator[Rendering | Combining]:
         """The steps, one after the other. Temporary files are removed when the iterator is closed."""
@@ -174,17 +177,16 @@ class Job:
                 yield from self._picture(frame, Path(folder))
 
     def _picture(self, frame: int, folder: Path) -> Iterator[Rendering | Combining]:
-        files: dict[str, list[str]] = {"crn": [], "independent": []}
+        files: dict[str, list[str]] = {kind: [] for kind in self.kinds}
         # Each frame has seeds of its own: equal noise in all of them would look like dirt on the lens.
         with kept_in_memory(self.scene):
-            for group in groups_of(self.samples, GROUPS, self.seed * 10007 + frame % 10007):
+            for group in groups_of(self.samples, GROUPS, self.seed * 10007 + frame % 10007, self.kinds):
                 path = str(folder / f"{group.kind}{len(files[group.kind])}.exr")
                 files[group.kind].append(path)
                 yield Rendering(self.scene, group, path)
                 self.done += 1
         statistics, output = str(folder / "statistics.json"), str(output_of(self.scene, frame))
-        combining = Combining(program.combine_command(self.program, files["crn"], files["independent"], output,
-                                                      self.denoise, statistics), output)
+        combining = Combining(program.command(self.program, files, output, self.denoise, statistics), output)
         yield combining
         self.done += 1
         self.output, self.verdict = output, program.verdict(statistics)

@@ -12,7 +12,9 @@ from . import jobs, program
 from ._cycles import GROUPS, OLDEST, blender, changed
 from .errors import Error
 
-DENOISE = (("none", "None", "Nothing but the samples"),
+DENOISE = (("auto", "Default", "Independent samples, denoised wherever held-out samples find less error, guided by "
+                               "Cycles' albedo and normal; Open Image Denoise takes part where the program finds it"),
+           ("none", "None", "Control variates alone: half of the samples have common random numbers"),
            ("bias", "Least Bias", "Denoised where held-out samples find hardly any bias"),
            ("balanced", "Balanced", "Between least bias and least error"),
            ("error", "Least Error", "Denoised wherever held-out samples find less error; Open Image Denoise takes part "
@@ -36,7 +38,7 @@ class Choice(bpy.types.PropertyGroup):  # type: ignore[misc,name-defined,unused-
     seed: bpy.props.IntProperty(  # type: ignore[valid-type,unused-ignore]
         name="Seed", default=0, min=0, max=8000, description="Another one, other samples")
     denoise: bpy.props.EnumProperty(  # type: ignore[valid-type,unused-ignore]
-        name="Denoise", items=DENOISE, default="none")
+        name="Denoise", items=DENOISE, default="auto")
 
 
 class State(bpy.types.PropertyGroup):  # type: ignore[misc,name-defined,unused-ignore]
@@ -81,8 +83,7 @@ def wrapped(layout: Any, context: Any, text: str, icon: str = "NONE") -> None:
 class RENDER_OT_covary(bpy.types.Operator):  # type: ignore[misc,name-defined,unused-ignore]
     bl_idname = "render.covary"
     bl_label = "Render Image"
-    bl_description = ("Render groups of samples with common and with independent random numbers, and combine them; Esc "
-                      "cancels")
+    bl_description = ("Render groups of samples and make one picture of them, with its predicted error; Esc cancels")
 
     animation: bpy.props.BoolProperty(  # type: ignore[valid-type,unused-ignore]
         name="Animation", description="All frames of the scene's range", options={"SKIP_SAVE"})

@@ -6,14 +6,14 @@ import json
 import os
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from .errors import UsageError
 
 #: Where scripts/blender_addon puts a copy of the program, if it is given one.
 OWN = Path(__file__).parent / "program" / "covary" / "bin" / "covary"
-DENOISE = ("none", "bias", "balanced", "error")
+DENOISE = ("auto", "none", "bias", "balanced", "error")
 
 
 def find(named: str, own: Path = OWN) -> Path:
@@ -50,12 +50,15 @@ def environment() -> dict[str, str]:
     return {name: value for name, value in os.environ.items() if name not in ("PYTHONHOME", "PYTHONPATH")}
 
 
-def combine_command(program: Path, crn: Sequence[str], independent: Sequence[str], output: str, denoise: str,
-                    statistics: str) -> list[str]:
-    """Combines files of groups into one image. Errors of its checks are only warnings here: the add-on rendered these
-    files correctly, and a white world only looks like clipped values."""
-    return [str(program), "combine", "--force", "--crn", *crn, "--independent", *independent, "-o", output,
-            "--denoise", denoise, "--json", statistics]
+def command(program: Path, files: Mapping[str, Sequence[str]], output: str, denoise: str,
+            statistics: str) -> list[str]:
+    """Makes one image of files of groups, by their kind. Errors of its checks are only warnings here: the add-on
+    rendered these files correctly, and a white world only looks like clipped values."""
+    if "crn" not in files:
+        return [str(program), "denoise", "--force", "--overwrite", *files["independent"], "-o", output, "--json",
+                statistics]
+    return [str(program), "combine", "--force", "--overwrite", "--crn", *files["crn"], "--independent", *files["independent"], "-o",
+            output, "--estimator", "iicv", "--denoise", denoise, "--json", statistics]
 
 
 def reason(messages: str) -> str:
@@ -78,7 +81,7 @@ def verdict(statistics: str) -> str:
     ours, theirs = values.get("predicted_relmse"), values.get("independent_predicted_relmse")
     if ours is None or theirs is None:
         return ""
-    return sentence(ours, theirs / 2)
+    return sentence(ours, theirs / 2 if values.get("crn_groups") else theirs)
 
 
 def sentence(ours: float, plain: float) -> str:

@@ -50,8 +50,8 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "mixture", *,
     counts: samples per pixel of the independent image over all groups, if they vary: whole numbers [H, W]; a Film
         knows its own. Needs samples.
     samples: samples per pixel of the CRN image, for counts and for estimators that need them.
-    denoise: for the least error ("auto", "error"), for little bias ("bias"), balanced, or "none"; by default "auto", or
-        "none" if another estimator is named. albedo, normal, position: guides [H, W, 3], the others only with the albedo;
+    denoise: for the least error ("auto", "error"), for little bias ("bias"), balanced, or "none"; by default "auto",
+        or "none" if another estimator is named. albedo, normal, position: guides [H, W, 3], the others only with the albedo;
         denoising_albedo, denoising_normal: guides seen through mirrors and glass (from render(): aovs["Albedo"],
         "N", "P", "DenoisingAlbedo", "DenoisingNormal"); oidn: Open Image Denoise's library or its folder, by default
         searched for; "off": not used.
@@ -67,8 +67,8 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "mixture", *,
     check_no_passes(options, "here are images that are rendered: counts= tells the samples that their pixels have")
     return Result(**_covary.combine(crn, independent, None if counts is None else _counts(counts), light, albedo,
                                     normal, denoising_albedo, denoising_normal, position, dict(layers or {}), estimator,
-                                    text_options(options, estimator), denoise or "", fspath(oidn), force, std_error, samples,
-                                    progress))
+                                    text_options(options, estimator), denoise or "", fspath(oidn), force, std_error,
+                                    samples, progress))
 
 
 def guides_of(aovs: Mapping[str, Any]) -> dict[str, Any]:

@@ -4,7 +4,7 @@
 Uses only the standard library: the Blender add-on includes this file and errors.py, but no compiled part."""
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -12,8 +12,10 @@ from typing import Any
 from .errors import UsageError
 
 OLDEST = (3, 4, 0)
-#: Groups of each of the two images.
+#: Groups of each image.
 GROUPS = 12
+#: The images that methods need.
+PAIR, INDEPENDENT = ("crn", "independent"), ("independent",)
 
 
 def blender() -> Any:
@@ -46,8 +48,23 @@ def blue_noise(cycles: Any) -> str:
     return lost if getattr(cycles, "sampling_pattern", "") == "BLUE_NOISE" else ""
 
 
+def view_layer(scene: Any) -> Any:
+    """The view layer whose auxiliary images guide the denoising; None if several make up the picture."""
+    used = [layer for layer in scene.view_layers if layer.use]
+    return used[0] if len(used) == 1 else None
+
+
+def guides_needed(scene: Any) -> list[tuple[Any, str, Any, str]]:
+    """As needed(), for groups that bring albedo and normal with them. Before the settings of needed()."""
+    layer, image = view_layer(scene), scene.render.image_settings
+    if layer is None:
+        return []
+    return [(layer.cycles, "denoising_store_passes", True, ""), (image, "media_type", "MULTI_LAYER_IMAGE", ""),
+            (image, "file_format", "OPEN_EXR_MULTILAYER", "")]
+
+
 def needed(scene: Any) -> list[tuple[Any, str, Any, str]]:
-    """(owner, name, value, reason) of each setting that both images need; reason "" if the picture stays the same."""
+    """(owner, name, value, reason) of each setting that all images need; reason "" if the picture stays the same."""
     cycles, image = scene.cycles, scene.render.image_settings
     mixes = "it mixes the errors of neighbouring pixels, which control variates take for independent"
     clamps = "what it clamps is missing from the mean, differently in both images"
@@ -82,15 +99,16 @@ def changed(scene: Any) -> list[tuple[str, Any, Any, str]]:
 
 
 @contextmanager
-def settings(scene: Any) -> Iterator[None]:
+def settings(scene: Any, guides: bool = False) -> Iterator[None]:
     """Applies the required settings; afterwards restores everything, including what a group changes."""
+    wanted = [*needed(scene), *(guides_needed(scene) if guides else [])]
     cycles, more = scene.cycles, ("samples", "sample_offset", "seed", "scrambling_distance", "use_sample_subset",
                                   "sample_subset_length")
-    kept = [(owner, name, getattr(owner, name)) for owner, name, _, _ in needed(scene) if hasattr(owner, name)]
+    kept = [(owner, name, getattr(owner, name)) for owner, name, _, _ in wanted if hasattr(owner, name)]
     kept += [(cycles, name, getattr(cycles, name)) for name in more if hasattr(cycles, name)]
     kept.append((scene.render, "filepath", scene.render.filepath))
     try:
-        for owner, name, value, _ in needed(scene):
+        for owner, name, value, _ in wanted:
             if hasattr(owner, name):
                 setattr(owner, name, value)
         yield
@@ -110,7 +128,7 @@ def kept_in_memory(scene: Any) -> Iterator[None]:
         render.use_persistent_data = before
 
 
-def check(scene: Any, spp: int, groups: int = GROUPS) -> None:
+def check(scene: Any, spp: int, groups: int = GROUPS, kinds: Sequence[str] = PAIR) -> None:
     """Raises UsageError for a scene whose groups cannot be rendered, and for an old Blender."""
     blender()
     if scene.render.engine != "CYCLES":
@@ -118,25 +136,28 @@ def check(scene: Any, spp: int, groups: int = GROUPS) -> None:
                          "scene.render.engine = 'CYCLES'")
     if scene.camera is None:
         raise UsageError(f"the scene '{scene.name}' has no camera: Add, Camera")
-    if spp % (2 * groups):
-        raise UsageError(f"spp: found {spp} samples in {groups} groups; a multiple of twice the number of groups is "
-                         "needed, half of it with common random numbers")
+    if spp % (len(kinds) * groups):
+        raise UsageError(f"spp: found {spp} samples in {groups} groups; a multiple of " + (
+            "the number of groups is needed" if len(kinds) == 1 else
+            "twice the number of groups is needed, half of it with common random numbers"))
 
 
 @dataclass(frozen=True)
 class Group:
-    """Samples of one of the two images that Cycles takes in a single render."""
+    """Samples of one of the images that Cycles takes in a single render."""
 
     #: "crn", with common random numbers, or "independent".
     kind: str
     samples: int
     seed: int
+    #: Whether albedo and normal are rendered, too, if view_layer() has them.
+    guides: bool = False
 
     @contextmanager
     def settings(self, scene: Any, path: str) -> Iterator[None]:
         """Those of the scene that write this group into a file."""
         cycles = scene.cycles
-        with settings(scene):
+        with settings(scene, self.guides):
             cycles.scrambling_distance = 0.0 if self.kind == "crn" else 1.0
             cycles.seed = self.seed
             # Samples n … 2 n - 1 of the pattern: its sample 0 lies at the pixel's centre for every seed.
@@ -150,8 +171,8 @@ class Group:
             yield
 
 
-def groups_of(spp: int, groups: int, seed: int) -> list[Group]:
-    """The groups of one picture: half of its samples with common random numbers, half with independent ones, each with
-    its own seed."""
-    return [Group(kind, spp // (2 * groups), (2 * seed + number) * groups + group)
-            for number, kind in enumerate(("crn", "independent")) for group in range(groups)]
+def groups_of(spp: int, groups: int, seed: int, kinds: Sequence[str] = PAIR) -> list[Group]:
+    """The groups of one picture, each with its own seed: of a PAIR, half of the samples have common random numbers;
+    otherwise all are INDEPENDENT, and bring what guides their denoising."""
+    return [Group(kind, spp // (len(kinds) * groups), (len(kinds) * seed + number) * groups + group, len(kinds) == 1)
+            for number, kind in enumerate(kinds) for group in range(groups)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Blender's Cycles as the renderer of both images, for scripts and `pip install bpy`.
+"""Blender's Cycles as the renderer of the images, for scripts and `pip install bpy`.
 
 docs/blender.md has the settings with reasons, and describes the add-on."""
 from __future__ import annotations
@@ -15,7 +15,7 @@ from . import _covary, _cycles
 from ._arguments import checked, flag, function, instance, optional, text, whole
 from ._combine import Progress, check_options, combine
 from ._cycles import Group
-from ._options import OptionValue
+from ._options import DEFAULT, OptionValue
 from ._render import SEED, SPP
 from ._result import Result, fields_of
 from .errors import UsageError
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 class BlenderResult(Result):
     """The result of render()."""
 
-    #: "crn" and "independent", to try other estimators.
+    #: "independent", and "crn" for estimators of two images, to try others.
     films: dict[str, Film] = field(repr=False)
     render_seconds: float
 
@@ -41,14 +41,23 @@ def changes(scene: Any) -> list[str]:
             for name, value, other, reason in _cycles.changed(scene)]
 
 
-def _images(bpy: Any, scene: Any, groups: list[Group]) -> Iterator[tuple[str, Any]]:
-    """Renders one group after the other: its kind and image."""
+def _layers_of(scene: Any, group: Group) -> dict[str, str]:
+    """Layers of a group's file by what they are; "" is that of a file with one layer."""
+    layer = _cycles.view_layer(scene)
+    if not group.guides or layer is None:
+        return {group.kind: ""}
+    return {group.kind: f"{layer.name}.Combined", "albedo": f"{layer.name}.Denoising Albedo",
+            "normal": f"{layer.name}.Denoising Normal"}
+
+
+def _images(bpy: Any, scene: Any, groups: list[Group]) -> Iterator[dict[str, Any]]:
+    """Renders one group after the other: its image by its kind, and its guides."""
     with tempfile.TemporaryDirectory(prefix="covary-blender-") as folder, _cycles.kept_in_memory(scene):
         path = str(Path(folder) / "group.exr")
         for group in groups:
             with group.settings(scene, path):
                 bpy.ops.render.render(write_still=True, scene=scene.name)
-            yield group.kind, _covary.read_image(path, "")
+            yield {name: _covary.read_image(path, layer) for name, layer in _layers_of(scene, group).items()}
 
 
 _SCENE = optional(instance("a bpy.types.Scene", lambda value: hasattr(value, "cycles")))
@@ -56,13 +65,14 @@ _SCENE = optional(instance("a bpy.types.Scene", lambda value: hasattr(value, "cy
 
 @checked(scene=_SCENE, spp=SPP, seed=SEED, groups=whole(3, _covary.most_groups), estimator=text, change=flag,
          progress=optional(function))
-def render(scene: Any = None, spp: int = 192, seed: int = 0, *, groups: int = 12, estimator: PairEstimator = "iicv",
+def render(scene: Any = None, spp: int = 192, seed: int = 0, *, groups: int = 12, estimator: PairEstimator = "mixture",
            change: bool = True, progress: Progress | None = None, **options: OptionValue) -> BlenderResult:
-    """Renders a Blender scene with Cycles, half of the samples with common random numbers and half with independent
-    ones, and combines both. Afterwards, all settings of the scene are restored.
+    """Renders a Blender scene with Cycles and takes its noise out. By default all samples are independent, and the
+    image is made as by covary.render(), guided by Cycles' albedo and normal; for estimators of two images, half of the
+    samples have common random numbers. Afterwards, all settings of the scene are restored.
 
     scene: a bpy.types.Scene; by default that of the context.
-    spp: samples per pixel of both images together, a multiple of 2 * groups.
+    spp: samples per pixel, a multiple of `groups`, or of 2 * groups for two images.
     seed: different seeds give different samples.
     change: render even if settings of the scene must be changed in a way that affects the picture (clamping, the
         denoiser, …), and say so in `warnings`; otherwise raise UsageError.
@@ -71,19 +81,22 @@ def render(scene: Any = None, spp: int = 192, seed: int = 0, *, groups: int = 12
     check_options(estimator, options)
     bpy = _cycles.blender()
     scene = scene or bpy.context.scene
-    _cycles.check(scene, spp, groups)
+    kinds = _cycles.INDEPENDENT if estimator == DEFAULT else _cycles.PAIR
+    _cycles.check(scene, spp, groups, kinds)
     changed = changes(scene)
     if changed and not change:
         raise UsageError(f"settings that cannot stay: {'; '.join(changed)}")
     started = time.perf_counter()
-    images = _collect(_images(bpy, scene, _cycles.groups_of(spp, groups, seed)), 2 * groups, progress)
+    images = _collect(_images(bpy, scene, _cycles.groups_of(spp, groups, seed, kinds)),
+                      len(kinds) * groups, progress)
     return _combined(images, spp, estimator, options, changed, time.perf_counter() - started)
 
 
-def _collect(groups: Iterator[tuple[str, Any]], total: int, progress: Progress | None) -> dict[str, list[Any]]:
-    images: dict[str, list[Any]] = {"crn": [], "independent": []}
-    for done, (kind, image) in enumerate(groups, 1):
-        images[kind].append(image)
+def _collect(groups: Iterator[dict[str, Any]], total: int, progress: Progress | None) -> dict[str, list[Any]]:
+    images: dict[str, list[Any]] = {}
+    for done, made in enumerate(groups, 1):
+        for name, image in made.items():
+            images.setdefault(name, []).append(image)
         if progress is not None:
             progress(done, total)
     return images
@@ -93,10 +106,12 @@ def _combined(images: dict[str, list[Any]], spp: int, estimator: str, options: d
               changed: list[str], seconds: float) -> BlenderResult:
     import numpy
 
-    films = {kind: film_from_groups(numpy.stack(members), spp // 2, sampling=kind) for kind, members in images.items()}
+    kinds = [kind for kind in images if kind in _cycles.PAIR]
+    films = {kind: film_from_groups(numpy.stack(images[kind]), spp // len(kinds), sampling=kind) for kind in kinds}
+    guides = {name: numpy.mean(images[name], axis=0) for name in ("albedo", "normal") if name in images}
     # What looks like a mistake of who rendered them is none, and only a warning: a white world seems clipped.
-    forced: dict[str, Any] = {"force": True} | options
-    result = combine(films["crn"], films["independent"], estimator, **forced)  # type: ignore[arg-type]
+    forced: dict[str, Any] = {"force": True} | guides | options
+    result = combine(films.get("crn"), films["independent"], estimator, **forced)  # type: ignore[arg-type]
     given = fields_of(result) | {"warnings": changed + result.warnings}
     return BlenderResult(**given, films=films, render_seconds=seconds)
 

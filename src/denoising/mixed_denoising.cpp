@@ -271,9 +271,9 @@ Run run_of_pair(const Estimator& base, const MixedDenoisingOptions& options, boo
     if (std::min(crn.groups, independent.groups) < 2 * base.fewest_groups) {
       MixedDenoising out;
       out.result = base.apply(crn, independent, settings);
-      out.result.note = fmt::format(
-          "with fewer than {} groups denoised images cannot be judged: the picture is that of {} alone",
-          2 * base.fewest_groups, base.text);
+      out.result.note =
+          fmt::format("with fewer than {} groups denoised images cannot be judged: the picture is that of {} alone",
+                      2 * base.fewest_groups, base.text);
       return out;
     }
     std::vector<CandidateMaker> makers = {filtered_candidates(settings.guides)};

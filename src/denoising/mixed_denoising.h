@@ -62,8 +62,8 @@ Estimator make_mixture(Settings& options);
 struct DenoisingChoice {
   static constexpr const char *kNone = "none", *kAuto = "auto";
   std::string mode = kNone;  ///< one of denoise_mode_names()
-  std::string oidn;           ///< a library or its folder; "": search for it, "off": do not use it
-  MixingHistory history;      ///< MixedDenoisingOptions::history; not an option
+  std::string oidn;          ///< a library or its folder; "": search for it, "off": do not use it
+  MixingHistory history;     ///< MixedDenoisingOptions::history; not an option
   bool denoises() const { return mode != kNone; }
   bool uses_oidn() const { return denoises() && oidn != "off"; }
 };

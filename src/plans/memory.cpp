@@ -49,7 +49,8 @@ RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const Ren
   for (const Phase& phase : plan.phases)
     for (const PassPlan& pass : phase.passes(state)) passes.push_back(pass);
   if (has_light_pass(scene, plan, request)) passes.push_back(light_pass_plan(plan, passes));
-  RenderMemory memory = render_memory(plan, passes, window.width, window.height, request.aovs || plan.estimator->reads_guides);
+  const bool aovs = request.aovs || plan.estimator->reads_guides;
+  RenderMemory memory = render_memory(plan, passes, window.width, window.height, aovs);
   memory.training = training_memory(scene, request);
   if (request.splits_layers()) {
     // Films of all layers, which the denoiser copies, and for each an image per candidate.

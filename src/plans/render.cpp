@@ -31,7 +31,8 @@ void check(const LoadedScene& scene, const Plan& plan, const RenderRequest& requ
   if (request.spp && (*request.spp < 1 || *request.spp > kMaxBudget))
     usage(fmt::format("{} samples per pixel; expected 1 to {}", *request.spp, kMaxBudget));
   if (plan.estimator->passes == EstimatorPasses::kSamples && (request.seconds > 0 || request.until > 0))
-    usage(plan.estimator->name + " must know the number of samples in advance, so time and error limits are impossible");
+    usage(plan.estimator->name +
+          " must know the number of samples in advance, so time and error limits are impossible");
   if (request.path_lengths && !integrator_of(scene).longest_path())
     usage("an image for each path length needs an integrator that supports it, such as controlled-path");
   if (request.splits_layers() && !plan.estimator->splits_layers)

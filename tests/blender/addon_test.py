@@ -113,13 +113,18 @@ class Program(AddonTest):
         seeds = [group.seed for seed in (0, 1) for group in self.cycles.groups_of(96, 12, seed)]
         self.assertEqual(len(set(seeds)), 48)
         self.assertEqual({group.samples for group in self.cycles.groups_of(96, 12, 0)}, {4})
+        alone = [group for seed in (0, 1) for group in self.cycles.groups_of(96, 12, seed, self.cycles.INDEPENDENT)]
+        self.assertEqual(len({group.seed for group in alone}), 24)
+        self.assertEqual({(group.kind, group.samples, group.guides) for group in alone}, {("independent", 8, True)})
 
     def test_says_where_nothing_is_gained(self):
         """Half of the samples have twice the error of all."""
         file = self.path / "statistics.json"
         for theirs, expected in ((0.005, "would have 0.0025."), (0.0025, "little is gained"), (0.001, "nothing is")):
-            file.write_text('{"predicted_relmse": 0.001, "independent_predicted_relmse": %g}' % theirs)
+            file.write_text('{"predicted_relmse": 0.001, "independent_predicted_relmse": %g, "crn_groups": 12}' % theirs)
             self.assertIn(expected, self.program.verdict(str(file)))
+        file.write_text('{"predicted_relmse": 0.001, "independent_predicted_relmse": 0.005}')
+        self.assertIn("would have 0.005.", self.program.verdict(str(file)), "all samples are independent")
         file.write_text("{}")
         self.assertEqual(self.program.verdict(str(file)), "")
 
