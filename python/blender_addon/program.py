@@ -57,8 +57,8 @@ def command(program: Path, files: Mapping[str, Sequence[str]], output: str, deno
     if "crn" not in files:
         return [str(program), "denoise", "--force", "--overwrite", *files["independent"], "-o", output, "--json",
                 statistics]
-    return [str(program), "combine", "--force", "--overwrite", "--crn", *files["crn"], "--independent", *files["independent"], "-o",
-            output, "--estimator", "iicv", "--denoise", denoise, "--json", statistics]
+    return [str(program), "combine", "--force", "--overwrite", "--crn", *files["crn"], "--independent",
+            *files["independent"], "-o", output, "--estimator", "iicv", "--denoise", denoise, "--json", statistics]
 
 
 def reason(messages: str) -> str:

@@ -51,10 +51,10 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "mixture", *,
         knows its own. Needs samples.
     samples: samples per pixel of the CRN image, for counts and for estimators that need them.
     denoise: for the least error ("auto", "error"), for little bias ("bias"), balanced, or "none"; by default "auto",
-        or "none" if another estimator is named. albedo, normal, position: guides [H, W, 3], the others only with the albedo;
-        denoising_albedo, denoising_normal: guides seen through mirrors and glass (from render(): aovs["Albedo"],
-        "N", "P", "DenoisingAlbedo", "DenoisingNormal"); oidn: Open Image Denoise's library or its folder, by default
-        searched for; "off": not used.
+        or "none" if another estimator is named. albedo, normal, position: guides [H, W, 3], the others only with the
+        albedo; denoising_albedo, denoising_normal: guides seen through mirrors and glass (from render():
+        aovs["Albedo"], "N", "P", "DenoisingAlbedo", "DenoisingNormal"); oidn: Open Image Denoise's library or its
+        folder, by default searched for; "off": not used.
     layers: parts of `independent` by name, such as direct light, in the same groups: denoised with it, they are in the
         result's aovs, and add up to its image with "Rest".
     std_error: estimate the error, too; by default if the estimator can.
