@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/number_text.h"
+#include "estimators/iicv.h"
 #include "integrators/registry.h"
 #include "passes/light_pass.h"
 #include "passes/training.h"

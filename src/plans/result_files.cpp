@@ -7,6 +7,7 @@
 #include <map>
 
 #include "combine/result_file.h"
+#include "estimators/mean.h"
 #include "film/film_file.h"
 #include "film/image_writer.h"
 #include "integrators/aov.h"
