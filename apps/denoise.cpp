@@ -173,11 +173,7 @@ void write_statistics(const Options& o, const CombineRequest& request, const Com
       {"independent_groups", request.independent.groups},
       {"nonfinite_pixels", combined.image.nonfinite_pixels},
       {"seconds", {{"read_and_check", combined.check_seconds}, {"estimate", combined.estimate_seconds}}}};
-  if (combined.predicted) {
-    add_prediction(*combined.predicted, json);
-    json["independent_predicted_relmse"] =
-        predicted_relmse_of_mean(request.independent, std::max(1, rows_in_memory(request)));
-  }
+  if (combined.predicted) add_prediction(*combined.predicted, json);
   add_risks(combined.image.risks, json);
   add_network(request.estimator.network, combined.image.network_runs, choice, json);
   if (!combined.image.note.empty()) json["note"] = combined.image.note;

@@ -78,10 +78,10 @@ def verdict(statistics: str) -> str:
         values = json.loads(Path(statistics).read_text())
     except (OSError, ValueError):
         return ""
-    ours, theirs = values.get("predicted_relmse"), values.get("independent_predicted_relmse")
-    if ours is None or theirs is None:
-        return ""
-    return sentence(ours, theirs / 2 if values.get("crn_groups") else theirs)
+    ours = values.get("predicted_relmse")
+    # Of a pair, half of the samples are independent.
+    theirs = values.get("independent_predicted_relmse", 0) / 2 or values.get("risks", {}).get("mean")
+    return "" if ours is None or theirs is None else sentence(ours, theirs)
 
 
 def sentence(ours: float, plain: float) -> str:

@@ -295,10 +295,12 @@ std::string yes_or_no(bool value) { return value ? "yes" : "no"; }
 
 std::string row_of(const Estimator& e) {
   const bool pair = e.passes == EstimatorPasses::kPair;
-  const char* passes = pair                                    ? "CRN and independent"
+  const bool is_default = e.name == kDefaultEstimator;
+  const char* passes = is_default                              ? "independent, or CRN and independent"
+                       : pair                                  ? "CRN and independent"
                        : e.passes == EstimatorPasses::kSamples ? "independent, all samples of a pixel"
                                                                : "one of either kind";
-  const std::string combine = !pair ? "no" : e.reach < 0 ? "whole images" : "in bands";
+  const std::string combine = is_default || (pair && e.reach < 0) ? "whole images" : pair ? "in bands" : "no";
   return fmt::format("| `{}` | {} | {} | {} | {} | {} |", e.name, passes, e.fewest_groups, yes_or_no(e.predicts_error),
                      yes_or_no(e.explain != nullptr), combine);
 }

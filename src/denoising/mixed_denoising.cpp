@@ -318,6 +318,7 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
   const bool with_oidn = options.use_oidn && (!options.oidn.library.empty() || !find_denoiser(options.oidn).empty());
   Estimator estimator = base;
   if (with_oidn) estimator.network = "Open Image Denoise " + denoiser_info(options.oidn).version;  // or throws
+  if (is_mean(base)) estimator.text.replace(0, base.name.size(), kMixture), estimator.name = kMixture;
   estimator.text += fmt::format(" --denoise {}{}", settings_of(options.mode).name, with_oidn ? "" : " --oidn off");
   estimator.fewest_groups = 2 * base.fewest_groups;
   estimator.reads_guides = true;

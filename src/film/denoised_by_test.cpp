@@ -11,8 +11,8 @@ namespace {
 TEST(DenoisedBy, IsToldByAttributesAndLayers) {
   EXPECT_EQ(denoised_by({}, {}), "");
   EXPECT_EQ(denoised_by({{"covary:estimator", "iicv"}, {"covary:samples", "64"}}, {}), "");
-  EXPECT_EQ(denoised_by({{"covary:estimator", "none --denoise auto --oidn off"}}, {}),
-            "none --denoise auto --oidn off");
+  EXPECT_EQ(denoised_by({{"covary:estimator", "mixture --denoise auto --oidn off"}}, {}),
+            "mixture --denoise auto --oidn off");
   EXPECT_EQ(denoised_by({{"covary:denoiser", "Open Image Denoise 2.5.1"}}, {}), "Open Image Denoise 2.5.1");
   std::vector<ExrFile::Channel> channels(2);
   channels[0].name = "ViewLayer.Combined.R", channels[1].name = "ViewLayer.Denoising Albedo.R";

@@ -68,15 +68,15 @@ TEST(RenderSettings, TheDefaultIsDenoisedAndANamedEstimatorIsNot) {
     const RenderSettings s = settings_from<RenderSettings>(values);
     return s.estimator + " " + s.denoising.mode;
   };
-  EXPECT_EQ(modes({}), "none auto");
-  EXPECT_EQ(modes({{"denoise", "bias"}}), "none bias");
-  EXPECT_EQ(modes({{"denoise", "none"}}), "none none");
-  EXPECT_EQ(modes({{"oidn", "off"}}), "none auto");
+  EXPECT_EQ(modes({}), "mixture auto");
+  EXPECT_EQ(modes({{"denoise", "bias"}}), "mixture bias");
+  EXPECT_EQ(modes({{"denoise", "none"}}), "mixture none");
+  EXPECT_EQ(modes({{"oidn", "off"}}), "mixture auto");
   EXPECT_EQ(modes({{"estimator", "iicv"}}), "iicv none");
   EXPECT_EQ(modes({{"estimator", "none"}}), "none none");
   EXPECT_EQ(modes({{"estimator", "iicv"}, {"denoise", "auto"}}), "iicv auto");
   EXPECT_EQ(modes({{"sampling", "crn"}}), "none none");
-  EXPECT_EQ(estimator_of(settings_from<RenderSettings>({{"oidn", "off"}}), {}).text, "none --denoise auto --oidn off");
+  EXPECT_EQ(estimator_of(settings_from<RenderSettings>({{"oidn", "off"}}), {}).text, "mixture --denoise auto --oidn off");
 }
 
 /// Two methods of a suite may share films if these are equal.

@@ -121,9 +121,9 @@ class Program(AddonTest):
         """Half of the samples have twice the error of all."""
         file = self.path / "statistics.json"
         for theirs, expected in ((0.005, "would have 0.0025."), (0.0025, "little is gained"), (0.001, "nothing is")):
-            file.write_text('{"predicted_relmse": 0.001, "independent_predicted_relmse": %g, "crn_groups": 12}' % theirs)
+            file.write_text('{"predicted_relmse": 0.001, "independent_predicted_relmse": %g}' % theirs)
             self.assertIn(expected, self.program.verdict(str(file)))
-        file.write_text('{"predicted_relmse": 0.001, "independent_predicted_relmse": 0.005}')
+        file.write_text('{"predicted_relmse": 0.001, "risks": {"mean": 0.005}}')
         self.assertIn("would have 0.005.", self.program.verdict(str(file)), "all samples are independent")
         file.write_text("{}")
         self.assertEqual(self.program.verdict(str(file)), "")
