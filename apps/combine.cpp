@@ -25,6 +25,7 @@
 #include "core/memory_limit.h"
 #include "core/stopwatch.h"
 #include "declared_options.h"
+#include "estimators/iicv.h"
 #include "estimators/mean.h"
 #include "estimators/sample_counts.h"
 #include "film/film_file.h"
@@ -362,6 +363,10 @@ void combine_frames(const CombineOptions& o, const FramePatterns& patterns) {
 
 void run(CombineOptions o) {
   static_cast<CombineSettings&>(o) = settings_from<CombineSettings>(o.values);
+  if (o.estimator == kDefaultEstimator && !o.of_estimator.empty()) {  // who gives an option of iicv means iicv
+    o.estimator = kIicv;
+    if (!o.values.contains("denoise")) o.denoising.mode = usual_denoising(o.estimator);
+  }
   check_passes(o);
   FramePatterns patterns{o.independent, {o.guides, o.light}, o.output, o.independent_layer};
   patterns.images.insert(patterns.images.end(), o.crn.begin(), o.crn.end());

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from . import _covary
 from ._arguments import (Rule, array, check_some, checked, choice, empty_or, flag, function, mapping_of, optional, path,
                          text, whole)
-from ._options import OptionValue, check_no_passes, text_options
+from ._options import DEFAULT, OptionValue, check_no_passes, text_options
 from ._result import Result
 from .errors import UsageError
 
@@ -45,7 +45,8 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "mixture", *,
     (None), `independent` alone is denoised, from two groups on.
 
     estimator: the default mixes denoised images into the combined one where held-out samples prefer them; "iicv" does
-        not denoise, and the others are there to compare with. Options follow as keywords (typed in covary.estimators).
+        not denoise, and the others are there to compare with. Options follow as keywords (typed in covary.estimators);
+        without an estimator they are those of "iicv".
     light: the film of light paths (pass "light"), to add to the result.
     counts: samples per pixel of the independent image over all groups, if they vary: whole numbers [H, W]; a Film
         knows its own. Needs samples.
@@ -65,6 +66,8 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "mixture", *,
     that the estimator does not have.
     """
     check_no_passes(options, "here are images that are rendered: counts= tells the samples that their pixels have")
+    if estimator == DEFAULT and options:
+        estimator = "iicv"  # whose options they are
     return Result(**_covary.combine(crn, independent, None if counts is None else _counts(counts), light, albedo,
                                     normal, denoising_albedo, denoising_normal, position, dict(layers or {}), estimator,
                                     text_options(options, estimator), denoise or "", fspath(oidn), force, std_error,

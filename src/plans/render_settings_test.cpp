@@ -76,7 +76,8 @@ TEST(RenderSettings, TheDefaultIsDenoisedAndANamedEstimatorIsNot) {
   EXPECT_EQ(modes({{"estimator", "none"}}), "none none");
   EXPECT_EQ(modes({{"estimator", "iicv"}, {"denoise", "auto"}}), "iicv auto");
   EXPECT_EQ(modes({{"sampling", "crn"}}), "none none");
-  EXPECT_EQ(estimator_of(settings_from<RenderSettings>({{"oidn", "off"}}), {}).text, "mixture --denoise auto --oidn off");
+  EXPECT_EQ(estimator_of(settings_from<RenderSettings>({{"oidn", "off"}}), {}).text,
+            "mixture --denoise auto --oidn off");
 }
 
 /// Two methods of a suite may share films if these are equal.

@@ -173,7 +173,7 @@ class Combine(OptionsTest):
         """The memory that BANDS permits makes bands."""
         planned = []
         for memory in ((), BANDS[0]):
-            self.good(*self.COMMAND, *memory, "--json", "facts.json")
+            self.good(*self.COMMAND, "--estimator", "iicv", *memory, "--json", "facts.json")
             planned.append(json.loads((self.path / "facts.json").read_text())["planned_memory_bytes"])
         self.assertLess(planned[1], planned[0])
 

@@ -113,7 +113,7 @@ class Denoise(RenderTest):
         self.good("render", ROOM, *SMALL, "-o", "b.exr", *IICV, "--spp", "24", "--passes", "films")
         inputs = ("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "c.exr")
         self.bad(1, "--guides 'b.exr' has no layer Albedo", *inputs, "--denoise", "error", *PLAIN, "--guides", "b.exr")
-        self.bad(2, "--guides is an option of --denoise", *inputs, "--guides", "b.exr")
+        self.bad(2, "--guides is an option of --denoise", *inputs, *IICV, "--guides", "b.exr")
         size = struct.unpack("<4i", header((self.path / "b.exr").read_bytes())[0]["dataWindow"])
         width, height = size[2] + 1, size[3] + 1
         for value in (math.nan, math.inf, -math.inf):
@@ -133,7 +133,7 @@ class Denoise(RenderTest):
                                          (width, height)))
             self.bad(1, f"guides.exr: the layer DenoisingNormal holds the value {value} at pixel (0, 0)", *inputs,
                      "--denoise", "error", *PLAIN, "--guides", "guides.exr")
-        self.bad(2, "--explain: with --denoise", *inputs, "--denoise", "error", *PLAIN, "--explain", "1,1")
+        self.bad(2, "--explain: a pixel that is denoised", *inputs, "--denoise", "error", *PLAIN, "--explain", "1,1")
 
     def test_single_pass(self):
         self.good("render", ROOM, *SMALL, "-o", "r.exr", "--estimator", "none", "--spp", "512", "--seed", "9")
@@ -141,7 +141,7 @@ class Denoise(RenderTest):
         self.good("render", ROOM, *SMALL, "-o", "plain.exr", *single)
         facts = self.statistics("-o", "a.exr", *single, "--denoise", "error", *PLAIN, "--aovs", "--passes", "films",
                                 "--save-stages", "steps")
-        self.assertEqual(facts["estimator"], "none --denoise error --oidn off")
+        self.assertEqual(facts["estimator"], "mixture --denoise error --oidn off")
         self.assertNotIn("note", facts)
         self.assertTrue((self.path / "steps/weight-regression.exr").exists())
         self.assertLess(self.relmse("a.exr", "r.exr"), 0.5 * self.relmse("plain.exr", "r.exr"))
@@ -149,8 +149,8 @@ class Denoise(RenderTest):
         alone = ("combine", "--independent", "films/independent.exr", "-o", "b.exr", "--quiet", "--error")
         self.good(*alone, "--denoise", "error", *PLAIN, "--guides", "a.exr")
         self.same("a.exr", "b.exr")
-        self.bad(2, "without --crn, independent images can only be denoised", *alone)
-        self.bad(2, "--estimator needs the image with common random numbers, --crn", *alone, "--denoise", "error",
+        self.bad(2, "without --crn, independent images can only be denoised", *alone, "--denoise", "none")
+        self.bad(2, "--estimator iicv needs the image with common random numbers, --crn", *alone, "--denoise", "error",
                  *PLAIN, "--estimator", "iicv")
         # A film with groups, the same samples; two renders of other seeds.
         self.good("render", ROOM, *SMALL, "-o", "film.exr", *single, "--groups", "12", "--aovs")
@@ -313,7 +313,7 @@ class Denoise(RenderTest):
         refused = self.run_covary("combine", "--crn", "1.exr", "--independent", "2.exr", "-o", "c.exr", "--layers",
                                   "Direct", "--force")
         self.assertEqual(refused.returncode, 2)
-        self.assertIn("iicv makes no --layers; denoised independent images have them", refused.stderr)
+        self.assertIn("iicv --denoise auto makes no --layers; denoised independent images have them", refused.stderr)
 
     def test_light_groups(self):
         """By the ids of lights, on surfaces and in media; they add up, and each has its lights alone."""
@@ -378,8 +378,8 @@ class Denoise(RenderTest):
                  "near.exr", *out)
         # Of covary by their attributes, of Cycles by its layer.
         self.good("denoise", "b.exr", "a.exr", "-o", "other.exr", *PLAIN)
-        self.bad(1, "out.exr … other.exr is denoised already (none --denoise auto --oidn off)", "denoise", "out.exr",
-                 "other.exr", "-o", "again.exr", *PLAIN)
+        self.bad(1, "out.exr … other.exr is denoised already (mixture --denoise auto --oidn off)", "denoise",
+                 "out.exr", "other.exr", "-o", "again.exr", *PLAIN)
         for name, values in (("x", first), ("y", second)):
             self.write(f"{name}.exr", exr({f"ViewLayer.{layer}.{c}": values for layer in ("Combined", "Noisy Image")
                                            for c in "RGB"}, size))

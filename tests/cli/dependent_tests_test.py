@@ -105,7 +105,7 @@ class DependentTests(RenderTest):
         self.bad(2, "20 samples per pixel are too few for dependent-tests: its first pass takes 20", *render, "--spp",
                  "20", "--dependent-spp", "20")
         self.bad(2, "--k is an option of --estimator iicv, cv-baseline, not of dependent-tests", *render, "--k", "3")
-        self.bad(2, "--max-region is an option of --estimator dependent-tests, not of none", "render", ROOM, "-o",
+        self.bad(2, "--max-region is an option of --estimator dependent-tests, not of mixture", "render", ROOM, "-o",
                  "a.exr", "--max-region", "3")
         self.bad(2, "--save-stages: iicv has no single steps", "render", ROOM, "-o", "a.exr", "--save-stages", "s",
                  "--estimator", "iicv")
@@ -125,7 +125,7 @@ class Adaptive(RenderTest):
 
     def test_a_denoised_mean_has_both_passes(self):
         facts = self.statistics("-o", "a.exr", "--adaptive", "--oidn", "off", "--spp", "48", "--passes", "films")
-        self.assertEqual(facts["estimator"], "none --adaptive --denoise auto --oidn off")
+        self.assertEqual(facts["estimator"], "mixture --adaptive --denoise auto --oidn off")
         self.assertEqual([p["samples_per_pixel"] for p in facts["passes"]], [12, 36])
         self.assertEqual(sorted(p.name for p in (self.path / "films").glob("*.exr")),
                          ["first-1.exr", "independent.exr"])

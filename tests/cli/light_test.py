@@ -65,7 +65,8 @@ class Render(LightTest):
         facts = self.render("-o", "on.exr", *IICV, "--spp", "24", "--light-tracing", "on", "--passes", "films")
         self.assertEqual(facts["light_paths"], 24 * PIXELS)
         self.assertGreater(facts["predicted_relmse"], 0)
-        combine = ("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "--error", "--quiet")
+        combine = ("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "--error", "--quiet",
+                   *IICV)
         self.good(*combine, "--light", "films/light.exr", "-o", "same.exr")
         on, same = self.channels("on.exr"), self.channels("same.exr")
         self.assertEqual(on, same)

@@ -392,7 +392,7 @@ class Numbers(OutputsTest):
         self.bad(2, "--penalty: '3': expected pilot", *combine, "--penalty", "3")
         self.bad(2, "--penalty: 'sampel'; did you mean 'sample'", *combine, "--penalty", "sampel")
         self.bad(2, "--residual-correction: '1': expected on, off", *combine, "--feedback", "1")
-        self.bad(2, "--estimator: 'none': expected iicv, cv-baseline, iduw", *combine, "--estimator", "none")
+        self.bad(2, "--estimator: 'none': expected mixture, iicv, cv-baseline, iduw", *combine, "--estimator", "none")
 
     def test_a_window_beyond_all_bounds(self):
         self.write("crn.exr", film(1, groups=3))

@@ -89,7 +89,7 @@ class Plans(RenderTest):
     def test_default_is_the_denoised_mean_of_independent_samples(self):
         default = ("--spp", "24", "--seed", "3", "--oidn", "off")
         facts = self.statistics("-o", "a.exr", *default, "--passes", "films")
-        self.assertEqual(facts["estimator"], "none --denoise auto --oidn off")
+        self.assertEqual(facts["estimator"], "mixture --denoise auto --oidn off")
         self.assertEqual([(p["sampling"], p["samples_per_pixel"], p["groups"]) for p in facts["passes"]],
                          [("independent", 24, 12)])
         self.assertLess(facts["predicted_relmse"], facts["risks"]["mean"])
@@ -121,8 +121,11 @@ class Plans(RenderTest):
         self.bad(2, "--save-stages: --split auto", "render", ROOM, "-o", "d.exr", *split, "--save-stages", "stages")
 
     def test_what_is_named_is_not_denoised(self):
-        for options in (("--estimator", "none"), ("--denoise", "none"), ("--sampling", "independent")):
-            self.assertEqual(self.statistics("-o", "a.exr", "--spp", "4", *options)["estimator"], "none")
+        for name, options in (("none", ("--estimator", "none")), ("mixture", ("--denoise", "none")),
+                              ("none", ("--sampling", "independent"))):
+            facts = self.statistics("-o", "a.exr", "--spp", "4", *options)
+            self.assertEqual(facts["estimator"], name)
+            self.assertNotIn("risks", facts)
         self.assertEqual(self.statistics("-o", "a.exr", "--spp", "8", *IICV)["estimator"], "iicv")
 
     def test_a_missing_network_is_said_once_and_is_no_error(self):
@@ -145,7 +148,7 @@ class Plans(RenderTest):
             self.good("render", ROOM, *SMALL, "-o", f"{sampling}.exr", "--sampling", sampling, "--groups", "12",
                       "--spp", "24", "--seed", "3")
         self.good("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "b.exr", "--error",
-                  "--quiet")
+                  "--estimator", "iicv", "--quiet")
         self.same("a.exr", "b.exr")
         info = json.loads(self.good("info", "a.exr", "--json").stdout)
         self.assertEqual(set(info["channels"]),
@@ -490,8 +493,8 @@ class Polynomials(RenderTest):
         self.bad(2, "--until: polynomials does not estimate its error", *render, "--until", "relmse=0.1")
         self.bad(2, "so their number must be known; use --spp", *render, "--time", "1")
         self.bad(2, "--k is an option of --estimator iicv, cv-baseline, not of polynomials", *render, "--k", "3")
-        self.bad(2, "--dimensions is an option of --estimator polynomials, not of none", "render", ROOM, "-o", "a.exr",
-                 "--dimensions", "2")
+        self.bad(2, "--dimensions is an option of --estimator polynomials, not of mixture", "render", ROOM, "-o",
+                 "a.exr", "--dimensions", "2")
         self.bad(2, "--dimensions: '7': expected a whole number from 1 to 6", *render, "--dimensions", "7")
         self.bad(2, "28 samples per pixel are too few to fit the 28 coefficients of 6 dimensions, expected at least 29",
                  *render, "--dimensions", "6", "--spp", "28")
