@@ -296,9 +296,7 @@ void check_passes(const CombineOptions& o) {
   if (o.estimator != kDefaultEstimator)
     usage(fmt::format("--estimator {} needs the image with common random numbers, --crn", o.estimator));
   if (!o.denoising.denoises())
-    usage(
-        "without --crn, independent images can only be denoised: --denoise auto, bias, balanced or error (their mean "
-        "is made by covary merge)");
+    usage("without --crn, independent images can only be denoised (their mean is made by covary merge)");
   for (const char* option : {"crn-layer", "samples", "explain"})
     if (o.values.contains(option)) usage(fmt::format("--{} needs the image with common random numbers, --crn", option));
 }
