@@ -195,8 +195,8 @@ TEST(EstimatorRegistry, AdaptiveEstimatorsHaveTheirNumbers) {
   EXPECT_TRUE(contains(message("none", {{"adaptive", ""}, {"min-spp", "0"}}), "min-spp is 0, expected 1 or more"));
   EXPECT_TRUE(contains(message("dependent-tests", {{"relative-error", "-1"}}), "relative error is -1"));
   EXPECT_TRUE(contains(message("dependent-tests", {{"min-spp", "9"}, {"max-spp", "8"}}), "more than max-spp"));
-  EXPECT_TRUE(
-      contains(message("iduw", {{"relative-error", "1"}}), "is an option of `estimator` iicv, dependent-tests, none"));
+  EXPECT_TRUE(contains(message("iduw", {{"relative-error", "1"}}),
+                       "is an option of `estimator` mixture, iicv, dependent-tests, none"));
   EXPECT_TRUE(contains(message("iicv", {{"allocation", "uniform"}}), "`allocation` has no effect without `adaptive`"));
   const Estimator iicv = make_estimator("iicv", {{"adaptive", ""}, {"max-spp", "99"}});
   ASSERT_TRUE(iicv.adaptive);

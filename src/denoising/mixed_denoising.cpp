@@ -312,13 +312,17 @@ bool can_be_denoised(const Estimator& estimator) {
 }
 
 Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& options) {
-  if (options.mode == DenoiseMode::kNone) return base;
+  const auto named = [&](const char* name) {
+    Estimator estimator = base;
+    if (is_mean(base)) estimator.text.replace(0, base.name.size(), name), estimator.name = name;
+    return estimator;
+  };
+  if (options.mode == DenoiseMode::kNone) return named(kMeanName);
   if (!can_be_denoised(base))
     throw Error(ErrorCode::kUsage, "denoising needs an estimator that predicts its error, not " + base.name);
   const bool with_oidn = options.use_oidn && (!options.oidn.library.empty() || !find_denoiser(options.oidn).empty());
-  Estimator estimator = base;
+  Estimator estimator = named(kMixture);
   if (with_oidn) estimator.network = "Open Image Denoise " + denoiser_info(options.oidn).version;  // or throws
-  if (is_mean(base)) estimator.text.replace(0, base.name.size(), kMixture), estimator.name = kMixture;
   estimator.text += fmt::format(" --denoise {}{}", settings_of(options.mode).name, with_oidn ? "" : " --oidn off");
   estimator.fewest_groups = 2 * base.fewest_groups;
   estimator.reads_guides = true;

@@ -160,7 +160,7 @@ TEST(MixedDenoising, OfASinglePassHasLessErrorThanItsMean) {
   const Inputs in(1);
   const Estimator estimator = mean_denoiser(DenoiseMode::kError);
   EXPECT_EQ(estimator.passes, EstimatorPasses::kIndependent);
-  EXPECT_EQ(estimator.text, "none --denoise error --oidn off");
+  EXPECT_EQ(estimator.text, "mixture --denoise error --oidn off");
   const double before = square_error(mean_of_groups(in.independent.view()).estimate);
   EXPECT_LT(square_error(denoised_mean(in.independent, DenoiseMode::kBias).estimate), 0.75 * before);
   EXPECT_LT(square_error(denoised_mean(in.independent, DenoiseMode::kBalanced).estimate), 0.35 * before);

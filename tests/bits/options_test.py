@@ -221,7 +221,7 @@ class Python(OptionsTest):
         if arguments.pop("guides", None):
             arguments |= {"albedo": covary.read_image(self.path / "guides.exr", "Albedo"),
                           "normal": covary.read_image(self.path / "guides.exr", "N")}
-        estimator = arguments.pop("estimator", "iicv")
+        estimator = arguments.pop("estimator", "mixture")
         result = covary.combine(*images, estimator, force=True, **arguments)
         plain = covary.combine(*images, estimator, force=True, std_error=False, **arguments)
         self.same(plain.image.tobytes(), result.image.tobytes(), "")

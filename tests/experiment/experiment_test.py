@@ -399,7 +399,7 @@ class Failures(ExperimentTest):
 
 class Mistakes(ExperimentTest):
     def test_methods_that_render_refuses(self):
-        refused = ((["--estimator", "iidw"], "'iidw'; did you mean 'iduw' or 'iicv'?: expected iicv, cv-baseline"),
+        refused = ((["--estimator", "iidw"], "'iidw'; did you mean 'iduw' or 'iicv'?: expected mixture, iicv"),
                    (["--windwo", "3"], "--windwo"),
                    (["--estimator", "iduw", "--k", "3"], "--k is an option of --estimator iicv, cv-baseline"),
                    (["--k", "-3"], "--k: '-3': expected a whole number of at least 1"))

@@ -35,8 +35,8 @@ def without_none(values):
     return tuple(value for value in values if value is not None)
 
 
-COMBINE = {"crn": NO_GROUPS, "independent": NO_GROUPS, "estimator": ("iicvv", "", *NO_TEXT), "light": (3, "x", [1]),
-           "counts": (3, "x", [1], -numpy.ones((20, 24), int), numpy.ones((3, 3), int)),
+COMBINE = {"crn": without_none(NO_GROUPS), "independent": NO_GROUPS, "estimator": ("iicvv", "", *NO_TEXT),
+           "light": (3, "x", [1]), "counts": (3, "x", [1], -numpy.ones((20, 24), int), numpy.ones((3, 3), int)),
            "samples": without_none(NO_SPP), "denoise": ("yes", "", *NO_TEXT), "albedo": without_none(NO_IMAGE),
            "normal": without_none(NO_IMAGE), "denoising_albedo": without_none(NO_IMAGE),
            "denoising_normal": without_none(NO_IMAGE), "position": without_none(NO_IMAGE),
@@ -268,8 +268,9 @@ class Arguments(PackageTest):
         arguments = inspect.signature(covary.combine).parameters
         self.assertEqual({name for option in declared if option not in files for name in other.get(option, [option])},
                          set(arguments) - {"options", "progress"})
-        for name in ("estimator", "denoise", "oidn"):
+        for name in ("estimator", "oidn"):
             self.assertEqual(declared[name]["default"], arguments[name].default)
+        self.assertIsNone(arguments["denoise"].default, "as the estimator has it")
         words = subprocess.run([os.environ["COVARY_PROGRAM"], "combine", "--help-all"], capture_output=True, text=True,
                                check=True).stdout
         for name in declared:

@@ -44,11 +44,11 @@ class Light(BesideTest):
 
     def test_bits_of_the_program(self):
         images = self.films["crn"], self.films["independent"]
-        result = covary.combine(*images, light=self.films["light"])
-        self.assert_program_has(result, "--light", "light.exr")
+        result = covary.combine(*images, "iicv", light=self.films["light"])
+        self.assert_program_has(result, "--light", "light.exr", "--estimator", "iicv")
         self.assert_same_bits(result.image.reshape(-1, 3), rgb(self.path / "whole.exr"))
         self.assertEqual(result.samples_per_pixel, 24)
-        arrays = covary.combine(*(film.groups for film in images), light=self.films["light"])
+        arrays = covary.combine(*(film.groups for film in images), "iicv", light=self.films["light"])
         self.assert_same_bits(arrays.image, result.image)
         self.assert_same_bits(arrays.std_error, result.std_error)
         self.assertEqual(covary.iduw(*images, light=self.films["light"]).std_error, None)
@@ -82,7 +82,8 @@ class Counts(BesideTest):
             self.assert_program_has(result, "--counts", "counts.exr", "--samples", 24)
         self.assertAlmostEqual(result.samples_per_pixel, 24 + self.counts.mean())
         self.assertFalse((result.image == covary.combine(*self.images).image).all())
-        self.assert_same_bits(covary.iicv(*self.images, counts=self.counts, samples=24).image, result.image)
+        denoised = covary.combine(*self.images, denoise="auto", counts=self.counts, samples=24)
+        self.assert_same_bits(denoised.image, result.image)
 
     def test_messages(self):
         self.write("counts", {"samples": self.counts})
@@ -140,7 +141,7 @@ class Denoise(BesideTest):
         independent = self.images[1]
         result = covary.combine(None, independent, denoise="auto", oidn="off", albedo=self.albedo, normal=self.normal,
                                 layers={"half": 0.5 * independent, "third": independent / 3})
-        self.assertEqual(result.estimator, "none --denoise auto --oidn off")
+        self.assertEqual(result.estimator, "mixture --denoise auto --oidn off")
         self.assertEqual(list(result.aovs), ["Rest", "half", "third"])
         numpy.testing.assert_allclose(sum(result.aovs.values()), result.image, rtol=1e-5, atol=1e-6)
         numpy.testing.assert_allclose(result.aovs["half"], 0.5 * result.image, rtol=1e-4, atol=1e-5)
@@ -160,7 +161,8 @@ class Denoise(BesideTest):
                                          position=position),
                          "position: it is a guide only together with the albedo")
         self.assertIn("crn: found None; without it, independent images can only be denoised",
-                      self.message_of(covary.UsageError, covary.combine, None, independent))
+                      self.message_of(covary.UsageError, covary.combine, None, independent,
+                                      denoise="none"))
         self.assertIn("crn: found None; 'iduw' needs the image with common random numbers",
                       self.message_of(covary.UsageError, covary.combine, None, independent, "iduw"))
         self.assertIn("the layer 'x' has 24 x 19 pixels", self.message_of(
@@ -170,11 +172,12 @@ class Denoise(BesideTest):
         def message(error, estimator="iicv", **keywords):
             return self.message_of(error, covary.combine, *self.images, estimator, **keywords)
         self.write("guides", {f"Albedo.{c}": self.albedo[:, :, i] for i, c in enumerate("RGB")})
-        self.assertIn("option of --denoise auto, bias", self.failure_of_program(*FILES, "--guides", "guides.exr"))
-        self.assertIn("albedo: guides are of denoise='auto', 'bias'",
+        self.assertIn("option of --denoise auto, bias", self.failure_of_program(*FILES, "--estimator", "iicv",
+                                                                            "--guides", "guides.exr"))
+        self.assertIn("albedo: guides are of denoising",
                       message(covary.UsageError, albedo=self.albedo))
         self.assertEqual(message(covary.UsageError, oidn="off"),
-                         self.failure_of_program(*FILES, "--oidn", "off").replace("--", ""))
+                         self.failure_of_program(*FILES, "--estimator", "iicv", "--oidn", "off").replace("--", ""))
         self.assertEqual(message(covary.UsageError, "dependent-tests", denoise="bias"),
                          self.failure_of_program(*FILES, "--denoise", "bias", "--estimator",
                                                  "dependent-tests").replace("--", ""))

@@ -188,7 +188,7 @@ class Cluster(PackageTest):
                 self.assertEqual((here.estimator, here.predicted_relmse, here.predicted_bounds, here.samples_per_pixel),
                                  (there.estimator, there.predicted_relmse, there.predicted_bounds,
                                   there.samples_per_pixel))
-        self.assertIn("window: is not an argument of estimator 'none'",
+        self.assertIn("window: is not an argument of estimator 'mixture'",
                       self.message_of(covary.UsageError, covary.distributed.render, self.client, self.scene(), 16,
                                       window=3))
 

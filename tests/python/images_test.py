@@ -69,7 +69,7 @@ class Combine(FilesTest):
 class Estimators(FilesTest):
     def test_functions_by_name(self):
         self.assert_same_bits(covary.iicv(self.crn, self.independent).image,
-                              covary.combine(self.crn, self.independent).image)
+                              covary.combine(self.crn, self.independent, "iicv").image)
         result = covary.iicv(self.crn, self.independent, paper=True, k=9)
         self.assertEqual(result.estimator, "iicv --paper --k 9")
         self.assertEqual(covary.cv_baseline(self.crn, self.independent, exclude_target=True).estimator,
