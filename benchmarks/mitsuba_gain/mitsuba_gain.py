@@ -55,9 +55,9 @@ def gain(plain, ours):
 def mitsuba_gains(scene, options):
     references = [path(scene, options.reference_spp, 1000 + n) for n in range(2)]
     ours, plain, seconds, plain_seconds = [], [], 0.0, 0.0
-    covary.mitsuba.render(scene, options.spp, seed=50), path(scene, options.spp, 50)  # compile
+    covary.mitsuba.render(scene, options.spp, seed=50, estimator="iicv"), path(scene, options.spp, 50)  # compile
     for seed in range(options.seeds):
-        result, taken = timed(covary.mitsuba.render, scene, options.spp, seed=100 + seed)
+        result, taken = timed(covary.mitsuba.render, scene, options.spp, seed=100 + seed, estimator="iicv")
         ours.append(result.image)
         seconds += taken
         image, taken = timed(path, scene, options.spp, 200 + seed)
