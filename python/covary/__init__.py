@@ -2,7 +2,7 @@
 """Less Monte Carlo noise by control variates and correlated sampling.
 
     import covary
-    result = covary.render(covary.scenes.path("room"), spp=48)      # or your own scene file
+    result = covary.render("room", spp=48)      # or your own scene file
     result.save("room.png")
 
 result.image is a float32 array [H, W, 3] of linear Rec. 709 radiance. combine() takes images of any renderer as arrays

@@ -41,7 +41,8 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "mixture", *,
 
     Each is a float32 array [T, H, W, 3], the means of T groups of samples (renders with different seeds), from NumPy,
     PyTorch or anything with DLPack or the buffer protocol, with any strides; or a Film. Values are linear; 12 groups
-    are recommended. The memory order [H, W, T, 3], as from read_groups() and Film.groups, is read in place. Without crn
+    are recommended. The memory order [H, W, T, 3], as from read_groups() and Film.groups, is read in place; an array of
+    that shape, of more than 64 x 64 pixels, is recognised, with a warning. Without crn
     (None), `independent` alone is denoised, from two groups on.
 
     estimator: the default mixes denoised images into the combined one where held-out samples prefer them; "iicv" does
@@ -65,13 +66,30 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "mixture", *,
     The result has the bits of `covary combine`. Raises InputError if the inputs do not match, UsageError for options
     that the estimator does not have.
     """
+    found: list[str] = []
+    crn, independent = _groups_first("crn", crn, found), _groups_first("independent", independent, found)
     check_no_passes(options, "here are images that are rendered: counts= tells the samples that their pixels have")
     if estimator == DEFAULT and options:
         estimator = "iicv"  # whose options they are
-    return Result(**_covary.combine(crn, independent, None if counts is None else _counts(counts), light, albedo,
-                                    normal, denoising_albedo, denoising_normal, position, dict(layers or {}), estimator,
-                                    text_options(options, estimator), denoise or "", fspath(oidn), force, std_error,
-                                    samples, progress))
+    made = _covary.combine(crn, independent, None if counts is None else _counts(counts), light, albedo,
+                           normal, denoising_albedo, denoising_normal, position, dict(layers or {}), estimator,
+                           text_options(options, estimator), denoise or "", fspath(oidn), force, std_error, samples,
+                           progress)
+    return Result(**made | {"warnings": found + made["warnings"]})
+
+
+#: No image has more groups than this and fewer columns; arrays that seem to are [H, W, T, 3].
+_MANY_GROUPS, _FEW_COLUMNS = 64, 32
+
+
+def _groups_first(name: str, image: Any, found: list[str]) -> Any:
+    """The array with its groups first, as [T, H, W, 3], and a warning in `found` if they were last."""
+    shape = tuple(getattr(image, "shape", ()))
+    turn = getattr(image, "permute", None) or getattr(image, "transpose", None)
+    if len(shape) != 4 or min(shape[:2]) <= _MANY_GROUPS or shape[2] > _FEW_COLUMNS or turn is None:
+        return image
+    found.append(f"{name}: the shape {list(shape)} was taken for [H, W, T, 3]; expected [T, H, W, 3]")
+    return turn(2, 0, 1, 3)
 
 
 def guides_of(aovs: Mapping[str, Any]) -> dict[str, Any]:
@@ -135,4 +153,7 @@ class InputReport:
 def check_inputs(crn: Any, independent: Any) -> InputReport:
     """Checks whether two images meet combine()'s assumptions: finite and linear, of one scene, one with common and the
     other with independent random numbers. Takes what combine() takes."""
-    return InputReport(**_covary.check_inputs(crn, independent))
+    found: list[str] = []
+    crn, independent = _groups_first("crn", crn, found), _groups_first("independent", independent, found)
+    made = _covary.check_inputs(crn, independent)
+    return InputReport(**made | {"warnings": found + made["warnings"]})

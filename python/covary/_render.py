@@ -19,6 +19,7 @@ from ._combine import DENOISE, DenoiseMode, Progress
 from ._options import DEFAULT, declared_rules, option_texts, passes_of, text_options, underscored
 from ._result import BadSample, RenderResult, text_of_bad_samples
 from .errors import BadSamplesWarning, UsageError
+from .scenes import _file_of
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -49,7 +50,7 @@ class Scene:
              min_depth: int | None = None, max_depth: int | None = None,
              integrator_options: Mapping[str, bool | int | float | str] | None = None,
              defines: Mapping[str, object] | None = None) -> Scene:
-        """Reads a Mitsuba XML scene.
+        """Reads a scene: Mitsuba XML, pbrt or glTF; or "room" and the other scenes.names() that come with the package.
 
         resolution: (width, height) of the full frame, instead of the scene's.
         integrator: "path", "bdpt", …, instead of the scene's.
@@ -59,7 +60,7 @@ class Scene:
         Raises InputError with every problem of the file.
         """
         texts = {name: str(value) for name, value in (defines or {}).items()}
-        return Scene(fspath(path), {"defines": texts, "resolution": resolution, "integrator": integrator,
+        return Scene(_file_of(fspath(path)), {"defines": texts, "resolution": resolution, "integrator": integrator,
                                     "min_depth": min_depth, "max_depth": max_depth,
                                     "integrator_options": dict(integrator_options or {})})
 

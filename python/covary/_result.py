@@ -2,12 +2,14 @@
 """The results of combine() and render()."""
 from __future__ import annotations
 
+import html
 from dataclasses import dataclass, field, fields
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
 from . import _covary
-from ._arguments import checked, path
+from ._arguments import checked, instance, optional, path, real
+from .errors import Error
 
 if TYPE_CHECKING:
     import numpy
@@ -16,9 +18,19 @@ if TYPE_CHECKING:
     FloatArray = NDArray[numpy.float32]
 
 
-@dataclass(frozen=True)
+_AXES = optional(instance("matplotlib's Axes", lambda value: hasattr(value, "imshow")))
+
+
+def relmse_text(value: float | None, bounds: tuple[float, float] | None) -> str:
+    """A predicted relMSE with its 80 % interval; "" if it is unknown."""
+    if value is None:
+        return ""
+    return f"predicted relMSE {value:.3g}" + (f" ({bounds[0]:.2g} to {bounds[1]:.2g})" if bounds else "")
+
+
+@dataclass(frozen=True, repr=False)
 class Result:
-    """An image and what is known of its error."""
+    """An image and what is known of its error. Its repr() is one line; in notebooks it shows the image."""
 
     #: Linear Rec. 709, [H, W, 3].
     image: FloatArray = field(repr=False)
@@ -55,10 +67,39 @@ class Result:
             attributes["covary:samples"] = f"{self.samples_per_pixel:g}"
         _covary.write_image(fspath(path), self.image, attributes)
 
+    def __repr__(self) -> str:
+        height, width = self.image.shape[:2]
+        samples = "" if self.samples_per_pixel is None else f"{self.samples_per_pixel:g} samples per pixel"
+        facts = [f"{width} x {height}", samples, self.estimator,
+                 relmse_text(self.predicted_relmse, self.predicted_bounds),
+                 f"{len(self.warnings)} warning{'s' if len(self.warnings) > 1 else ''}" if self.warnings else ""]
+        return f"<covary.{type(self).__name__} {', '.join(fact for fact in facts if fact)}>"
+
     def _repr_html_(self) -> str:
         from .notebook import view
 
-        return view({"image": self})._repr_html_()
+        try:
+            return view({"image": self})._repr_html_()
+        except (Error, OSError, ValueError) as error:  # such as an image without pixels, or a full disk: the cell stays
+            return f"<pre>{html.escape(repr(self))}\n{html.escape(str(error))}</pre>"
+
+    @checked(exposure=real(), axes=_AXES)
+    def plot(self, exposure: float = 0.0, axes: Any = None) -> Any:
+        """Draws the image, 2^exposure times as bright and in sRGB, into axes of matplotlib, by default new ones, and
+        returns them."""
+        import numpy
+
+        try:
+            from matplotlib import pyplot  # type: ignore[import-not-found,import-untyped,unused-ignore]
+        except ImportError as error:
+            raise ImportError("plot() needs matplotlib: pip install matplotlib") from error
+        linear = numpy.clip(numpy.nan_to_num(self.image * 2.0 ** exposure), 0, 1)
+        shown = numpy.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+        axes = pyplot.subplots()[1] if axes is None else axes
+        axes.imshow(shown)
+        axes.set_axis_off()
+        axes.set_title(relmse_text(self.predicted_relmse, self.predicted_bounds) or self.estimator)
+        return axes
 
 
 def fields_of(result: Result) -> dict[str, Any]:
@@ -96,7 +137,7 @@ def text_of_bad_samples(not_finite: int, negative: int, samples: list[BadSample]
     return "\n".join([*lines, *(f"  {sample}\n    {sample.replay}" for sample in samples)])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RenderResult(Result):
     """The result of a render."""
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from .estimators import PairEstimator
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BlenderResult(Result):
     """The result of render()."""
 

@@ -155,7 +155,7 @@ class _Canvas:
         return (total / numpy.maximum(samples, 1)).astype(numpy.float32)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ClusterResult(Result):
     """The result of render()."""
 

@@ -31,7 +31,7 @@ _GUIDES = ("Albedo", "N", "DenoisingAlbedo", "DenoisingNormal")
 _defined: dict[str, None] = {}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class MitsubaResult(Result):
     """The result of render()."""
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The small scenes that come with the package: `covary.render(covary.scenes.path("room"), spp=48)`."""
+"""The small scenes that come with the package: `covary.render("room", spp=48)`."""
 from __future__ import annotations
 
 from pathlib import Path
@@ -13,6 +13,12 @@ _FOLDER = Path(__file__).parent / "share" / "covary" / "scenes"  # where the pac
 def names() -> list[str]:
     """The names of all of them."""
     return sorted(file.stem for file in _FOLDER.glob("*.xml"))
+
+
+def _file_of(scene: str) -> str:
+    """`scene`, the name of a file; or, if there is no such file, the file of the scene that comes under that name."""
+    known = "/" not in scene and not Path(scene).exists() and scene in names()
+    return str(_FOLDER / f"{scene}.xml") if known else scene
 
 
 @checked(name=text)

@@ -72,6 +72,7 @@ BAD = {
     "covary.read_groups": {"paths": (3, None, [], [3], "", [""]), "layer": (None, "Albdo", *NO_TEXT)},
     "covary.denoise": {"image": NO_GROUPS, "albedo": NO_IMAGE, "normal": NO_IMAGE, "library": ("/nowhere", *NO_TEXT)},
     "covary.Result.save": {"path": ("x.webp", "x", None, *NO_PATH)},
+    "covary.Result.plot": {"exposure": ("1", True, float("nan")), "axes": (3, "x")},
     "covary.Film.load": {"path": (None, *NO_PATH)},
     "covary.Film.save": {"path": (None, *NO_PATH)},
     "covary.Film.attributes": {"attributes": (None, *NO_TEXTS)},
@@ -152,6 +153,7 @@ class Arguments(PackageTest):
         exr = str(self.path / "image.exr")
         covary.write_image(exr, image)
         bound = {"covary.Scene.with_integrator": self.scene.with_integrator, "covary.Result.save": self.result.save,
+                 "covary.Result.plot": self.result.plot,
                  "covary.Film.load": covary.Film.load, "covary.Film.save": self.film.save,
                  "covary.Film.attributes": lambda attributes: setattr(self.film, "attributes", attributes),
                  "covary.View.save": covary.View("", 1).save}

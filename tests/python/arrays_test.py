@@ -62,6 +62,19 @@ class Layouts(PackageTest):
         self.assert_same_bits(EXPECTED, self.combined(DlpackOnly))
         self.assert_same_bits(EXPECTED, self.combined(lambda a: memoryview(a.tobytes()).cast("B").cast("f", a.shape)))
 
+    def test_groups_last(self):
+        """Are recognised in large images, and said."""
+        random = numpy.random.default_rng(5)
+        images = [random.gamma(2, 0.5, (12, 70, 80, 3)).astype(numpy.float32) for _ in range(2)]
+        expected = covary.combine(*images, "iicv", force=True)
+        result = covary.combine(*(image.transpose(1, 2, 0, 3) for image in images), "iicv", force=True)
+        self.assert_same_bits(result.image, expected.image)
+        self.assertEqual([text for text in result.warnings if "taken for" in text],
+                         [f"{name}: the shape [70, 80, 12, 3] was taken for [H, W, T, 3]; expected [T, H, W, 3]"
+                          for name in ("crn", "independent")])
+        self.assertEqual(covary.check_inputs(*(image.transpose(1, 2, 0, 3) for image in images)).crn_mean,
+                         covary.check_inputs(*images).crn_mean)
+
     def test_inputs_stay_as_they_are(self):
         crn, independent = CRN.copy(), INDEPENDENT.copy()
         covary.combine(crn, independent)

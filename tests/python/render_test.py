@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """render(): the values of `covary render`, limits, interruption."""
+import dataclasses
 import json
 import math
 import os
@@ -90,6 +91,13 @@ class Render(PackageTest):
         self.assertIs(scene.with_integrator(""), scene)
         self.assertEqual(scene.with_integrator("bdpt").integrator, "bdpt")
         self.assertIn("36 x 24", repr(scene))
+        self.assertEqual(*(covary.Scene.load(file).content_hash for file in ("room", covary.scenes.path("room"))))
+        result = covary.render(scene, 4, "none", groups=2)
+        self.assertRegex(repr(result), r"^<covary\.RenderResult 36 x 24, 4 samples per pixel, none, predicted relMSE "
+                                       r"[0-9.]+( \([0-9.]+ to [0-9.]+\))?>$")
+        without_pixels = dataclasses.replace(result, image=numpy.zeros((0, 0, 3), numpy.float32))
+        self.assertIn("&lt;covary.RenderResult", without_pixels._repr_html_())
+        self.assertIn("<iframe", result._repr_html_())
         self.assertEqual(len(scene.content_hash), len(self.scene().content_hash))
 
     def test_files_and_resume(self):
