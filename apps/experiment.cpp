@@ -40,6 +40,7 @@ struct ExperimentCommand {
   std::string seeds, part;
   std::vector<uint32_t> spp;
   std::vector<double> seconds;
+  std::vector<std::string> programs;
   lab::Overrides overrides;
   int threads = 0;
   bool list = false, print = false, keep_passes = false, quiet = false;
@@ -158,11 +159,38 @@ RenderOptions parsed(std::vector<std::string> words, bool of_frames) {
   return options;
 }
 
-lab::PlanContext plan_context() {
-  return {program_version(), [](const std::vector<std::string>& words) {
+lab::PlanContext plan_context(const lab::Programs& programs) {
+  return {program_version(),
+          [](const std::vector<std::string>& words) {
             const RenderOptions options = parsed(words, true);
             return pass_words(options.values, options.of_integrator, options.of_estimator);
-          }};
+          },
+          programs};
+}
+
+/// --program NAME=COMMAND.
+lab::Programs programs_of(const std::vector<std::string>& words) {
+  lab::Programs programs;
+  for (const std::string& word : words) {
+    const size_t equals = word.find('=');
+    if (equals == std::string::npos || equals == 0 || equals + 1 == word.size())
+      throw Error(ErrorCode::kUsage, "--program '" + word + "': expected NAME=COMMAND, e.g. mine='python3 mine.py'");
+    if (!programs.emplace(word.substr(0, equals), word.substr(equals + 1)).second)
+      throw Error(ErrorCode::kUsage, "--program '" + word.substr(0, equals) + "' is given twice");
+  }
+  return programs;
+}
+
+/// A method for each program that none of the suite's refers to: it gets independent samples in groups, and guides.
+void add_methods_of_programs(const lab::Programs& programs, lab::Suite& suite) {
+  for (const auto& [name, command] : programs) {
+    const auto refers = [&](const lab::MethodEntry& method) { return method.program == name; };
+    if (std::any_of(suite.methods.begin(), suite.methods.end(), refers)) continue;
+    lab::MethodEntry method;
+    method.name = method.program = name;
+    method.options = {"--estimator", "none", "--groups", "8", "--aovs"};
+    suite.methods.push_back(method);
+  }
 }
 
 constexpr const char *kResults = "/results.json", *kTable = "/results.csv", *kReport = "/report.html";
@@ -198,9 +226,9 @@ void check_files(const ExperimentCommand& command, const lab::Suite& suite, cons
                       command.output, name));
 }
 
-/// Parses each method's options as `covary render` will, so that nothing runs unless all are valid. run_experiment()
-/// reports other mistakes of the suite.
-void check_methods(const lab::Suite& suite) {
+/// Checks that all programs are given, and parses each method's options as `covary render` will, so that nothing runs
+/// unless all are valid. run_experiment() reports other mistakes of the suite.
+void check_methods(const lab::Suite& suite, const lab::Programs& programs) {
   if (!lab::validate(suite).empty()) return;
   const bool of_frames = std::any_of(suite.scenes.begin(), suite.scenes.end(),
                                      [](const lab::SceneEntry& scene) { return !scene.frames.empty(); });
@@ -214,6 +242,9 @@ void check_methods(const lab::Suite& suite) {
     } catch (const std::runtime_error& error) {
       problems.push_back(fmt::format("method '{}': {}", method.name, error.what()));
     }
+    if (!method.program.empty() && !programs.contains(method.program))
+      problems.push_back(fmt::format("method '{}' is made by a program of your own: give --program {}=COMMAND",
+                                     method.name, method.program));
   }
   if (!problems.empty()) throw Error(ErrorCode::kUsage, fmt::format("{}", fmt::join(problems, "\n")));
 }
@@ -262,10 +293,12 @@ void experiment(ExperimentCommand command) {
   for (uint32_t spp : command.spp) command.overrides.budgets.push_back({spp, 0});
   for (double seconds : command.seconds) command.overrides.budgets.push_back({0, seconds});
   const lab::Part part = parse_part(command.part);
-  const lab::Suite suite = load_suite(command);
+  const lab::Programs programs = programs_of(command.programs);
+  lab::Suite suite = load_suite(command);
+  add_methods_of_programs(programs, suite);
   if (command.print) return write_text_output("-", json_text(lab::to_json(suite)));
   if (command.output.empty()) throw Error(ErrorCode::kUsage, "no folder for the results given; use -o DIR");
-  check_methods(suite);
+  check_methods(suite, programs);
   std::error_code error;
   fs::create_directories(command.output, error);
   if (error) throw Error(ErrorCode::kIo, fmt::format("cannot make the folder {}: {}", command.output, error.message()));
@@ -278,7 +311,7 @@ void experiment(ExperimentCommand command) {
   options.program = program_path();
   options.cache_folder = fs::absolute(command.cache.empty() ? command.output + "/cache" : command.cache).string();
   options.scenes_folder = scenes;
-  options.context = plan_context();
+  options.context = plan_context(programs);
   options.max_pixels = command.overrides.quick ? lab::kQuickPixels : 0;
   options.threads = command.threads;
   options.keep_passes = command.keep_passes;
@@ -306,6 +339,10 @@ void add_experiment(CLI::App& app) {
   add_value(*command, "-o,--output", o->output, kFolderValue, "Folder for report.html, results.json and results.csv");
   command->add_flag("--list", o->list, "List the built-in suites");
   command->add_flag("--print", o->print, "Print the suite as it would be run, to start your own from");
+  add_value(*command, "--program", o->programs, "NAME=COMMAND",
+            "A method of your own: a command that makes the image $COVARY_OUTPUT of what was rendered, $COVARY_IMAGE "
+            "and $COVARY_FILMS")
+      ->allow_extra_args(false);
   add_value(*command, "--scenes", o->scenes, kFolderValue, "Folder of the suite's scene files");
   add_value(*command, "--cache", o->cache, kFolderValue,
             "Folder of finished runs; default: cache in the output folder");

@@ -12,6 +12,7 @@ from . import errors, metrics, progress, scenes
 from ._combine import InputReport, check_inputs, combine
 from ._covary import version as __version__
 from ._images import denoise, read_groups, read_image, write_image
+from ._laboratory import Experiment, Samples, experiment
 from ._program import program
 from ._render import Scene, render, set_threads
 from ._result import BadSample, RenderResult, Result
@@ -22,9 +23,9 @@ from .film import Film, film_from_groups, merge_films
 from .notebook import View, view
 
 __all__ = [
-    "BadSample", "BadSamplesWarning", "Error", "Film", "InputError", "InputReport", "InternalError", "IoError",
-    "RenderResult", "Result", "Scene", "UsageError", "View", "__version__", "check_inputs", "combine", "denoise",
-    "errors", "film_from_groups", "merge_films", "metrics", "program", "progress", "read_groups", "read_image",
-    "render", "scenes", "set_threads", "view", "write_image",
+    "BadSample", "BadSamplesWarning", "Error", "Experiment", "Film", "InputError", "InputReport", "InternalError",
+    "IoError", "RenderResult", "Result", "Samples", "Scene", "UsageError", "View", "__version__", "check_inputs",
+    "combine", "denoise", "errors", "experiment", "film_from_groups", "merge_films", "metrics", "program", "progress",
+    "read_groups", "read_image", "render", "scenes", "set_threads", "view", "write_image",
 ]
 __all__ += _estimators

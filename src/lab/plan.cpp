@@ -13,6 +13,7 @@
 
 #include "core/content_hash.h"
 #include "core/error.h"
+#include "core/shell_text.h"
 #include "sequences/frame_names.h"
 
 namespace covary::lab {
@@ -68,6 +69,19 @@ Words flattened(const std::vector<Words>& steps) {
 }
 
 }  // namespace
+
+std::string identity_of_program(const std::string& command) {
+  std::string text = command;
+  for (const std::string& word : words_of_shell_text(command)) {
+    std::error_code ignored;
+    if (!fs::is_regular_file(word, ignored)) continue;
+    std::ifstream file(word, std::ios::binary);
+    std::stringstream content;
+    content << file.rdbuf();
+    text += "\n" + hash_text(hash_bytes(content.str()));
+  }
+  return text;
+}
 
 std::vector<std::string> files_of(std::span<const int> frames, const std::string& path) {
   if (frames.empty() || !is_frame_pattern(path)) return Words(std::max<size_t>(1, frames.size()), path);
@@ -169,8 +183,16 @@ std::vector<Run> runs_of_scene(const Suite& suite, size_t index, const SceneInst
         run.scene = index, run.method = m, run.budget = b, run.seed = seed;
         run.options = joined({scene.options(), suite.common_options, method.options, amount, seed_words});
         run.then = method.then, run.frames = scene.frames;
+        Words own;
+        if (!method.program.empty()) {
+          run.program = context.programs.at(method.program);
+          run.environment = {"COVARY_SCENE=" + scene.file, fmt::format("COVARY_SEED={}", seed),
+                             budget.spp ? fmt::format("COVARY_SPP={}", budget.spp)
+                                        : fmt::format("COVARY_SECONDS={:g}", budget.seconds)};
+          own = {identity_of_program(run.program)};
+        }
         run.work = budget.spp * static_cast<double>(scene.n_pixels());
-        run.key = key_of("run", context, scene, {run.options, flattened(run.then)});
+        run.key = key_of("run", context, scene, {run.options, flattened(run.then), own});
         run.timed = budget.seconds > 0;
         // With a time budget, the samples depend on the method's speed, so passes are not shared.
         run.passes_key = budget.spp ? key_of("passes", context, scene,

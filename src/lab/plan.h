@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -48,6 +49,8 @@ struct Run {
   size_t scene = 0, method = 0, budget = 0;  ///< indices into the suite; method and budget are unused for references
   uint64_t seed = 0;
   std::vector<std::string> options;  ///< of `covary render SCENE`, without outputs
+  std::string program;               ///< shell command that makes the image of what was rendered; or empty
+  std::vector<std::string> environment;  ///< "NAME=value" for that command: what the run is
   std::vector<std::vector<std::string>> then;
   std::vector<int> frames;  ///< as in SceneInstance
   double work = 0;          ///< samples, for the time left
@@ -56,12 +59,20 @@ struct Run {
   std::string passes_key;   ///< the same for all runs that can share the films of their passes
 };
 
+/// Commands of the user's, for the shell, by the names that methods have for them. Suites only hold names, so that a
+/// suite of somebody else starts no program.
+using Programs = std::map<std::string, std::string>;
+
 /// What is the same for all runs.
 struct PlanContext {
   std::string program_version;  ///< part of every key
   /// The options of a method's `covary render` that determine the samples of passes: equal words, equal passes.
   std::function<std::vector<std::string>(const std::vector<std::string>&)> pass_words;
+  Programs programs = {};
 };
+
+/// Names the command's result: its text, and the contents of the files that its words name.
+std::string identity_of_program(const std::string& command);
 
 /// Both halves of the reference that must be rendered for a scene.
 std::vector<Run> reference_runs(const Suite& suite, const SceneInstance& scene, const PlanContext& context);

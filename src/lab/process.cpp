@@ -65,7 +65,7 @@ class HeldSignals {
 
 /// Runs in the child between fork and exec: async-signal-safe calls only. Leaves the terminal's process group: the
 /// parent handles Ctrl-C and passes it on once; a second signal would end the child before it has saved its work.
-[[noreturn]] void become(char* const* arguments, int output, int errors, pid_t parent, const HeldSignals& held) {
+[[noreturn]] void become(char* const* arguments, char* const* environment, int output, int errors, pid_t parent, const HeldSignals& held) {
   setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(127);  // the parent died before the line above
@@ -75,7 +75,7 @@ class HeldSignals {
   dup2(errors, 2);
   for (const int signal : HeldSignals::kSignals) std::signal(signal, SIG_DFL);
   held.restore();
-  execv(arguments[0], arguments);
+  execve(arguments[0], arguments, environment);
   _exit(127);
 }
 
@@ -99,14 +99,18 @@ bool read_some(int descriptor, std::string& text) {
 
 }  // namespace
 
-ProcessResult run_process(const std::vector<std::string>& command, const std::atomic<bool>* stop) {
-  std::vector<char*> arguments;
+ProcessResult run_process(const std::vector<std::string>& command, const std::atomic<bool>* stop,
+                          const std::vector<std::string>& environment) {
+  std::vector<char*> arguments, variables;
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
+  for (const std::string& own : environment) variables.push_back(const_cast<char*>(own.c_str()));  // the first counts
+  for (char** inherited = environ; *inherited; ++inherited) variables.push_back(*inherited);
+  variables.push_back(nullptr);
   Pipe output, errors;
   const Stopwatch watch;
   const pid_t parent = getpid(), child = start([&](const HeldSignals&held) {
-                                   become(arguments.data(), output.write, errors.write, parent, held);
+                                   become(arguments.data(), variables.data(), output.write, errors.write, parent, held);
                                  });
   output.close_write(), errors.close_write();
 

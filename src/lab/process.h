@@ -22,6 +22,8 @@ struct ProcessResult {
 /// Runs `command` (path of the program, then its arguments) until it ends. When *stop becomes true, the child gets
 /// SIGINT once; Ctrl-C in the terminal does not reach it directly. The child is killed if the calling process dies, for
 /// whatever reason. Throws Error(kIo) if no process can be started.
-ProcessResult run_process(const std::vector<std::string>& command, const std::atomic<bool>* stop = nullptr);
+/// `environment`: "NAME=value", beside the caller's own.
+ProcessResult run_process(const std::vector<std::string>& command, const std::atomic<bool>* stop = nullptr,
+                          const std::vector<std::string>& environment = {});
 
 }  // namespace covary::lab

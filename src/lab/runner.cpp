@@ -127,7 +127,8 @@ Runner::Result Runner::execute(const Run& run, const SceneInstance& scene) const
   render.insert(render.end(), run.options.begin(), run.options.end());
   const std::string typed_command = typed(render);
   if (threads_ > 0) render.insert(render.end(), {"--threads", fmt::format("{}", threads_)});
-  std::string output = run.then.empty() ? image : folder + "/step0" + number + ".exr";
+  const bool is_last = run.then.empty() && run.program.empty();
+  std::string output = is_last ? image : folder + "/step0" + number + ".exr";
   render.insert(render.end(), {"--quiet", "--no-preview", "--json", stats, "-o", output});
   // Of an interrupted sequence, complete frames are kept instead of films.
   if (run.frames.empty()) render.insert(render.end(), {"--passes", cache_.path("passes", run.passes_key)});
@@ -150,6 +151,20 @@ Runner::Result Runner::execute(const Run& run, const SceneInstance& scene) const
   record.image = image;
   record.command = typed_command;
   record.messages = process.errors;
+  const auto add_step = [&](const std::string& typed_step, const ProcessResult& step) {
+    record.then_seconds += step.seconds;
+    record.peak_memory_bytes = std::max(record.peak_memory_bytes, static_cast<double>(step.peak_memory_bytes));
+    record.command += " && " + typed_step;
+    record.messages += step.errors;
+    for (const std::string& file : files_of(run.frames, output)) fs::remove(file);
+  };
+  if (!run.program.empty()) {
+    const std::string made = run.then.empty() ? image : folder + "/program.exr";
+    const ProcessResult own = run_program(run, output, made);
+    if (!own.ok()) return failed(run.program, own);
+    add_step(run.program, own);
+    output = made;
+  }
   for (size_t i = 0; i < run.then.size(); ++i) {
     const std::string next = i + 1 == run.then.size() ? image : fmt::format("{}/step{}{}.exr", folder, i + 1, number);
     Words step{program_, run.then[i][0], output};
@@ -158,15 +173,26 @@ Runner::Result Runner::execute(const Run& run, const SceneInstance& scene) const
     step.insert(step.end(), {"-o", next});
     const ProcessResult after = run_process(step, stop_);
     if (!after.ok()) return failed(typed_step, after);
-    record.then_seconds += after.seconds;
-    record.peak_memory_bytes = std::max(record.peak_memory_bytes, static_cast<double>(after.peak_memory_bytes));
-    record.command += " && " + typed_step;
-    record.messages += after.errors;
-    for (const std::string& file : files_of(run.frames, output)) fs::remove(file);
+    add_step(typed_step, after);
     output = next;
   }
   cache_.write_json("runs", run.key + "/run.json", json_of(record));
   return {record, std::nullopt};
+}
+
+/// Runs the user's program. A result without the image that it was asked for is a failure.
+ProcessResult Runner::run_program(const Run& run, const std::string& rendered, const std::string& wanted) const {
+  std::error_code ignored;
+  fs::remove(wanted, ignored);
+  std::vector<std::string> environment = run.environment;
+  environment.insert(environment.end(), {"COVARY_IMAGE=" + rendered, "COVARY_OUTPUT=" + wanted,
+                                         "COVARY_FILMS=" + cache_.path("passes", run.passes_key),
+                                         fmt::format("COVARY_THREADS={}", threads_)});
+  ProcessResult result = run_process({"/bin/sh", "-c", run.program}, stop_, environment);
+  if (!result.ok() || fs::exists(wanted)) return result;
+  result.exit_code = 1;
+  result.errors += "the program ended without writing the image that COVARY_OUTPUT names";
+  return result;
 }
 
 void Runner::remove_passes(const std::string& passes_key) const {

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "lab/plan.h"
+#include "lab/process.h"
 
 namespace covary::lab {
 
@@ -83,6 +84,8 @@ class Runner {
   void remove_passes(const std::string& passes_key) const;
 
  private:
+  ProcessResult run_program(const Run& run, const std::string& rendered, const std::string& wanted) const;
+
   const Cache& cache_;
   std::string program_;
   int threads_;

@@ -79,6 +79,7 @@ Json json_of(const SceneEntry& scene) {
 
 Json json_of(const MethodEntry& method) {
   Json json{{"name", method.name}, {"options", method.options}};
+  if (!method.program.empty()) json["program"] = method.program;
   if (!method.then.empty()) json["then"] = method.then;
   if (method.unbiased) json["unbiased"] = true;
   if (method.optional) json["optional"] = true;
@@ -110,8 +111,13 @@ std::vector<std::string> validate(const Suite& suite) {
         problems.push_back(
             fmt::format("the seed {} is reserved for references, which must not share samples with a run", seed));
   }
-  for (const MethodEntry& method : suite.methods)
+  const bool of_frames = std::any_of(suite.scenes.begin(), suite.scenes.end(),
+                                     [](const SceneEntry& scene) { return !scene.frames.empty(); });
+  for (const MethodEntry& method : suite.methods) {
     check_options("method '" + method.name + "'", method.options, problems);
+    if (of_frames && !method.program.empty())
+      problems.push_back("method '" + method.name + "': a program makes single images, not frames");
+  }
   check_options("common_options", suite.common_options, problems);
   for (const std::string& word : suite.common_options)
     if (word.substr(0, word.find('=')) == "--estimator")

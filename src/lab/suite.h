@@ -51,6 +51,8 @@ struct MethodEntry {
   std::vector<std::vector<std::string>> then;  ///< further commands "covary WORD… IN -o OUT"
   bool unbiased = false;                       ///< a squared bias then suggests a wrong reference
   bool optional = false;                       ///< skipped, with a warning, on scenes and machines that lack support
+  /// Name of a program of the user's that makes the image of what was rendered (Programs in plan.h); or empty.
+  std::string program = "";
 };
 
 struct Suite {

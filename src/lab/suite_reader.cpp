@@ -86,6 +86,7 @@ class SuiteReader {
     MethodEntry method;
     method.name = reader.required_text("name");
     method.options = reader.texts("options");
+    method.program = reader.text("program").value_or("");
     for (const auto& [name, flag] : {std::pair{"unbiased", &method.unbiased}, {"optional", &method.optional}})
       if (const Json* value = reader.find(name)) {
         if (value->is_boolean())

@@ -72,6 +72,9 @@ BAD = {
     "covary.read_groups": {"paths": (3, None, [], [3], "", [""]), "layer": (None, "Albdo", *NO_TEXT)},
     "covary.denoise": {"image": NO_GROUPS, "albedo": NO_IMAGE, "normal": NO_IMAGE, "library": ("/nowhere", *NO_TEXT)},
     "covary.Result.save": {"path": ("x.webp", "x", None, *NO_PATH)},
+    "covary.experiment": {"suite": (3, "quik", ""), "output": (None, *NO_PATH), "methods": (3, {"a": 3}),
+                          "scenes": NO_PATH, "options": (3, "--quick", [3])},
+    "covary.Samples.layer": {"name": ("Albdo", *NO_TEXT)}, "covary.Samples.film": {"name": ("nothing", *NO_TEXT)},
     "covary.Result.plot": {"exposure": ("1", True, float("nan")), "axes": (3, "x")},
     "covary.Film.load": {"path": (None, *NO_PATH)},
     "covary.Film.save": {"path": (None, *NO_PATH)},
@@ -82,7 +85,8 @@ BAD = {
     "covary.View.save": {"path": (None, *NO_PATH)},
     "covary.view": {"images": (3, [3], {"a/b": numpy.zeros((2, 2, 3), numpy.float32)}), "reference": (3,),
                     "title": (None, *NO_TEXT), "height": (0, 0.5, *NO_NUMBERS), "small": NO_FLAG},
-    "covary.metrics.compute": {"name": ("relmsee", None, *NO_TEXT), **METRIC, "denominator": NO_IMAGE},
+    "covary.experiment": {"suite": "quick", "output": self.path / "out"},
+                 "covary.metrics.compute": {"name": ("relmsee", None, *NO_TEXT), **METRIC, "denominator": NO_IMAGE},
     **{f"covary.metrics.{metric['name'].replace('-', '_')}": METRIC for metric in covary._covary.metrics()},
     "covary.scenes.path": {"name": ("rom", None, "../room", *NO_TEXT)},
     "covary.distributed.render": {
@@ -110,7 +114,7 @@ BAD = {
     "covary.blender.changes": {"scene": (3, None)},
 }
 #: Classes that results are made of, which nobody calls, errors, and functions without arguments of ours.
-NOT_CALLED = ("Error", "Warning", "Result", "Report", "BadSample", "Scene", "Film", "View")
+NOT_CALLED = ("Error", "Warning", "Result", "Report", "BadSample", "Scene", "Film", "View", "Experiment", "Samples")
 WITHOUT_ARGUMENTS = ("program", "names", "tqdm")
 
 
@@ -126,7 +130,7 @@ def public_functions():
         for name in names:
             if callable(getattr(module, name)) and not name.endswith(NOT_CALLED) and name not in WITHOUT_ARGUMENTS:
                 yield f"{place}.{name}", getattr(module, name)
-    for cls in (covary.Scene, covary.Result, covary.View, covary.Film):
+    for cls in (covary.Scene, covary.Result, covary.Samples, covary.View, covary.Film):
         for name, value in inspect.getmembers(cls, callable):
             if not name.startswith("_"):
                 yield f"covary.{cls.__name__}.{name}", value
@@ -151,9 +155,11 @@ class Arguments(PackageTest):
         """Arguments with which it would work, and the function, bound to an object where it belongs to one."""
         image = noisy(3, False)[0]
         exr = str(self.path / "image.exr")
+        self.samples = covary.Samples(exr, str(self.path), str(ROOM), 1, 8, None)
         covary.write_image(exr, image)
         bound = {"covary.Scene.with_integrator": self.scene.with_integrator, "covary.Result.save": self.result.save,
                  "covary.Result.plot": self.result.plot,
+                 "covary.Samples.layer": self.samples.layer, "covary.Samples.film": self.samples.film,
                  "covary.Film.load": covary.Film.load, "covary.Film.save": self.film.save,
                  "covary.Film.attributes": lambda attributes: setattr(self.film, "attributes", attributes),
                  "covary.View.save": covary.View("", 1).save}
@@ -164,6 +170,7 @@ class Arguments(PackageTest):
                  "covary.write_image": {"path": exr, "image": image}, "covary.read_groups": {"paths": [exr]},
                  "covary.denoise": {"image": image}, "covary.film_from_groups": {"groups": self.crn, "samples": 24},
                  "covary.view": {"images": image},
+                 "covary.experiment": {"suite": "quick", "output": self.path / "out"},
                  "covary.metrics.compute": {"name": "relmse", **of_metric, "reference2": image},
                  "covary.distributed.render": {"client": Client(), "scene": self.scene, "spp": 24},
                  "covary.distributed.experiment": {"client": Client(), "suite": "iicv-table1", "output": "out"},

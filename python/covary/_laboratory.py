@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Experiments in which methods may be Python functions."""
+from __future__ import annotations
+
+import csv
+import hashlib
+import inspect
+import json
+import os
+import shlex
+import socketserver
+import sys
+import tempfile
+import threading
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from . import _covary
+from ._arguments import checked, either, function, instance, list_of, mapping_of, optional, path, text
+from ._images import read_image
+from ._program import run_program
+from .errors import Error, InputError, UsageError
+from .film import Film
+
+if TYPE_CHECKING:
+    from ._result import FloatArray
+
+_CALL = Path(__file__).with_name("_call.py")
+_SOCKET = "COVARY_METHODS"
+
+
+@dataclass(frozen=True)
+class Samples:
+    """What a method of experiment() makes its image of."""
+
+    #: File of the mean of all samples, with the layers that were rendered.
+    path: str
+    #: Folder with the film of each pass.
+    films: str
+    #: The scene's file, the seed, and the samples per pixel, or seconds, of the budget.
+    scene: str
+    seed: int
+    spp: int | None
+    seconds: float | None
+
+    @cached_property
+    def image(self) -> FloatArray:
+        """The mean of all samples, linear, [H, W, 3]."""
+        return read_image(self.path)
+
+    @checked(name=text)
+    def layer(self, name: str) -> FloatArray:
+        """Another layer of the image, [H, W, 3]: "Albedo", "N", "P", "DenoisingAlbedo", "DenoisingNormal"."""
+        return read_image(self.path, name)
+
+    @checked(name=text)
+    def film(self, name: str = "independent") -> Film:
+        """A pass: its `groups` are means of samples [T, H, W, 3]."""
+        return Film.load(Path(self.films) / f"{name}.exr")
+
+
+@dataclass(frozen=True, repr=False)
+class Experiment:
+    """The results of experiment()."""
+
+    #: With report.html, results.json and results.csv.
+    folder: Path
+    #: results.json (docs/file-formats.md).
+    results: dict[str, Any] = field(repr=False)
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """results.csv, a dictionary for each line, for `pandas.DataFrame(rows)`."""
+        with open(self.folder / "results.csv", encoding="utf-8", newline="") as file:
+            return [{key: _number(value) for key, value in row.items()} for row in csv.DictReader(file)]
+
+    def __repr__(self) -> str:
+        return f"<covary.Experiment {str(self.folder)!r}, {len(self.results['cells'])} cells>"
+
+
+def _number(value: str) -> Any:
+    try:
+        return float(value) if value else None
+    except ValueError:
+        return value
+
+
+class _Server(socketserver.ThreadingUnixStreamServer):
+    daemon_threads = True
+
+    def __init__(self, address: str, methods: Mapping[str, Callable[[Samples], Any]]) -> None:
+        self.methods, self.lock = methods, threading.Lock()
+        super().__init__(address, _Request)
+
+
+class _Request(socketserver.StreamRequestHandler):
+    def handle(self) -> None:
+        """Answers with nothing once the image is written, or with what went wrong."""
+        asked = json.loads(self.rfile.readline())
+        server: Any = self.server
+        try:
+            with server.lock:
+                _make(server.methods[asked["name"]], asked["run"])
+        except Exception as error:  # noqa: BLE001  the experiment reports it as the method's failure
+            self.wfile.write(f"{type(error).__name__}: {error}\n{traceback.format_exc()}".encode())
+
+
+def _make(method: Callable[[Samples], Any], run: dict[str, str]) -> None:
+    import numpy
+
+    samples = Samples(run["COVARY_IMAGE"], run["COVARY_FILMS"], run["COVARY_SCENE"], int(run["COVARY_SEED"]),
+                      int(run["COVARY_SPP"]) if "COVARY_SPP" in run else None,
+                      float(run["COVARY_SECONDS"]) if "COVARY_SECONDS" in run else None)
+    image = numpy.ascontiguousarray(method(samples), numpy.float32)
+    _covary.write_image(run["COVARY_OUTPUT"], image, {})
+
+
+@contextmanager
+def _served(methods: Mapping[str, Callable[[Samples], Any]]) -> Iterator[None]:
+    """While methods can be asked for images."""
+    with tempfile.TemporaryDirectory(prefix="covary-methods-") as folder:
+        address = str(Path(folder) / "socket")
+        before = os.environ.get(_SOCKET)
+        with _Server(address, methods) as server:
+            threading.Thread(target=server.serve_forever, daemon=True).start()
+            os.environ[_SOCKET] = address
+            try:
+                yield
+            finally:
+                server.shutdown()
+                os.environ.pop(_SOCKET)
+                if before is not None:
+                    os.environ[_SOCKET] = before
+
+
+def _source_hash(method: Callable[..., Any]) -> str:
+    """Of its source, so that a changed method is computed again. What it calls elsewhere does not count."""
+    try:
+        source = inspect.getsource(method)
+    except (OSError, TypeError):
+        source = repr(method)
+    return hashlib.sha256(source.encode()).hexdigest()[:16]
+
+
+def _program_of(name: str, method: Callable[..., Any]) -> str:
+    return f"{name}={shlex.join([sys.executable, '-I', str(_CALL), name, _source_hash(method)])}"
+
+
+_SUITE = "the name of a suite, the file of one or of a scene, or a suite as a dictionary"
+
+
+@checked(suite=either(_SUITE, instance(_SUITE, lambda value: isinstance(value, dict)), path), output=path,
+         methods=optional(mapping_of(function, "a mapping from names to functions")), scenes=optional(path),
+         options=optional(list_of(text, "a list of words of the program")))
+def experiment(suite: str | PathLike[str] | dict[str, Any], output: str | PathLike[str], *,
+               methods: Mapping[str, Callable[[Samples], Any]] | None = None,
+               scenes: str | PathLike[str] | None = None, options: list[str] | None = None) -> Experiment:
+    """Compares methods over scenes, budgets and seeds, as `covary experiment` does; methods may be Python functions.
+
+    suite: the name of a built-in suite, a suite's or a scene's file, or a suite as a dictionary (docs/experiments.md).
+    output: folder for the report and the results; finished runs in it are not repeated.
+    methods: functions by name. Each gets Samples and returns an image, [H, W, 3], linear. A method of the suite says
+        by "program": NAME what it renders for it; functions that none refers to get independent samples in eight
+        groups, with auxiliary features. They are called one after the other, in another thread, and what they take
+        counts as their time. A function is computed again if its source has changed.
+    scenes: folder of the suite's scenes; for a dictionary, by default the current folder.
+    options: further words of the program, such as ["--quick"] or ["--spp", "16,64"].
+
+    Raises InputError if runs failed, with their messages; those that did not are kept.
+    """
+    given = methods or {}
+    words = [word for name, method in given.items() for word in ("--program", _program_of(name, method))]
+    if scenes is not None:
+        words += ["--scenes", fspath(scenes)]
+    with tempfile.TemporaryDirectory(prefix="covary-suite-") as folder, _served(given):
+        if isinstance(suite, dict):
+            file = Path(folder) / "suite.json"
+            file.write_text(json.dumps(suite), encoding="utf-8")
+            words += ["--scenes", os.getcwd()] if scenes is None else []
+            suite = file
+        code, _, errors = run_program("experiment", suite, "-o", output, "--quiet", *words, *(options or []))
+    if code:
+        raise {1: InputError, 2: UsageError}.get(code, Error)(errors.strip().removeprefix("covary: "))
+    made = Path(output)
+    return Experiment(made, json.loads((made / "results.json").read_text(encoding="utf-8")))
