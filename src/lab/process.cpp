@@ -65,7 +65,8 @@ class HeldSignals {
 
 /// Runs in the child between fork and exec: async-signal-safe calls only. Leaves the terminal's process group: the
 /// parent handles Ctrl-C and passes it on once; a second signal would end the child before it has saved its work.
-[[noreturn]] void become(char* const* arguments, char* const* environment, int output, int errors, pid_t parent, const HeldSignals& held) {
+[[noreturn]] void become(char* const* arguments, char* const* environment, int output, int errors, pid_t parent,
+                         const HeldSignals& held) {
   setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(127);  // the parent died before the line above

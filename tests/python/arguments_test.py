@@ -85,8 +85,7 @@ BAD = {
     "covary.View.save": {"path": (None, *NO_PATH)},
     "covary.view": {"images": (3, [3], {"a/b": numpy.zeros((2, 2, 3), numpy.float32)}), "reference": (3,),
                     "title": (None, *NO_TEXT), "height": (0, 0.5, *NO_NUMBERS), "small": NO_FLAG},
-    "covary.experiment": {"suite": "quick", "output": self.path / "out"},
-                 "covary.metrics.compute": {"name": ("relmsee", None, *NO_TEXT), **METRIC, "denominator": NO_IMAGE},
+    "covary.metrics.compute": {"name": ("relmsee", None, *NO_TEXT), **METRIC, "denominator": NO_IMAGE},
     **{f"covary.metrics.{metric['name'].replace('-', '_')}": METRIC for metric in covary._covary.metrics()},
     "covary.scenes.path": {"name": ("rom", None, "../room", *NO_TEXT)},
     "covary.distributed.render": {
