@@ -29,7 +29,8 @@ inline constexpr const char* kDefaultEstimator = kMixture;
 inline constexpr const char* kNoEstimator = kMeanName;  ///< the film is the image
 
 /// Throws Error(kUsage) for an unknown name, listing the known ones; for an option that the estimator does not have,
-/// listing those that have it; and for values out of range.
+/// listing those that have it; and for values out of range. Of the default it makes what is denoised;
+/// make_default_estimator() makes all of it.
 Estimator make_estimator(const std::string& name, const OptionValues& values = {});
 
 /// Names of the estimators for which `accepts` is true, with their default options.
@@ -58,6 +59,7 @@ Estimator with_denoising(const Estimator& base, const DenoisingChoice& choice);
 std::string usual_denoising(const std::string& estimator);
 /// What the default means for a pair of images (`is_pair`) or for independent samples alone, with its options and
 /// denoising. Throws Error(kUsage) like make_estimator() and with_denoising().
-Estimator make_default_estimator(bool is_pair, const OptionValues& values, const DenoisingChoice& choice);
+Estimator make_default_estimator(bool is_pair = false, const OptionValues& values = {},
+                                 const DenoisingChoice& choice = {DenoisingChoice::kAuto, "", {}});
 
 }  // namespace covary

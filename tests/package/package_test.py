@@ -99,7 +99,7 @@ class Package(unittest.TestCase):
 
     def test_rendering_gives_the_image_of_the_program(self):
         self.run_in_folder(self.prefix / "bin" / "covary", "render", ROOM, "-o", "a.exr", "--resolution", "120x80",
-                           "--spp", 24, "--estimator", "iicv", "--no-preview", "--quiet")
+                           "--spp", 24, "--no-preview", "--quiet")
         printed = self.run_in_folder(self.examples / "render_scene", ROOM, "b.exr")
         self.assertRegex(printed, r"^24 samples per pixel in .* predicted relMSE 0\.\d+\n$")
         self.assertEqual(rgb(self.work / "a.exr"), rgb(self.work / "b.exr"))

@@ -18,7 +18,7 @@ int main(int argc, char** argv) try {
   load.make_integrator = covary::integrator_maker({});  // the scene's integrator
   const covary::LoadedScene scene = covary::load_scene(argv[1], load);
 
-  const covary::Plan plan = covary::estimator_plan(covary::make_estimator(covary::kDefaultEstimator));
+  const covary::Plan plan = covary::estimator_plan(covary::make_default_estimator());
   covary::RenderRequest request;
   request.spp = 24;
   request.output = argv[2];
