@@ -21,6 +21,7 @@ void add_combine(CLI::App& app);
 void add_denoise(CLI::App& app);
 void add_experiment(CLI::App& app);
 void add_view(CLI::App& app);
+void add_scenes(CLI::App& app);
 void add_help(CLI::App& app);
 /// Adds all subcommands, and the program's help.
 void add_commands(CLI::App& app);

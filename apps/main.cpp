@@ -146,7 +146,7 @@ void add_commands(CLI::App& app) {
                          add_convert_scene, add_help})
     add(app);
   const std::vector<CLI::App*> everybodys = app.get_subcommands([](CLI::App*) { return true; });
-  for (const auto add : {add_experiment, add_merge, add_probe}) add(app);
+  for (const auto add : {add_experiment, add_scenes, add_merge, add_probe}) add(app);
   for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; })) {
     const bool is_everybodys = std::find(everybodys.begin(), everybodys.end(), command) != everybodys.end();
     command->group(is_everybodys ? "Commands" : "Laboratory");
