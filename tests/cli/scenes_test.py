@@ -35,7 +35,7 @@ class Scenes(CliTest):
         self.assertEqual(lines["kitchen/scene_v3.xml"], "another version")
         self.assertEqual(lines["staircase/scene_v3.xml"], "missing")
         self.assertIn("house/scene_v3.xml", lines["house/scene_v3.xml"])
-        self.bad(2, "no suite is named 'iicv-table2'; did you mean 'iicv-table1'?", "scenes", "iicv-table2")
+        self.bad(2, "no suite is named 'iicv-table2'; did you mean 'iicv-table1'", "scenes", "iicv-table2")
 
 
 if __name__ == "__main__":
