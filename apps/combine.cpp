@@ -147,19 +147,20 @@ GuideImages read_guides(const CombineOptions& o, const Estimator& estimator, con
     throw Error(ErrorCode::kUsage,
                 "--guides is an option of --denoise auto, bias, balanced and error, not of " + estimator.name);
   const ImageInfo info = inspect_image(o.guides);
-  const auto own = [&](const char* name) -> std::optional<Image> {  // guides that `render` wrote
+  const auto own = [&](const char* name, GuideKind kind) -> std::optional<Image> {  // guides that `render` wrote
     const bool is_there = std::any_of(info.channels.begin(), info.channels.end(),
                                       [&](const auto& c) { return c.name.starts_with(std::string(name) + "."); });
-    return is_there ? std::optional(named_guide(o.guides, info, name)) : std::nullopt;
+    return is_there ? std::optional(named_guide(o.guides, info, kind, file.colours(), name)) : std::nullopt;
   };
-  GuideImages guides{own("Albedo"),
-                     own("N"),
-                     own("DenoisingAlbedo"),
-                     own("DenoisingNormal"),
+  const auto find = [&](GuideKind kind) { return find_guide(o.guides, info, kind, file.colours()); };
+  GuideImages guides{own("Albedo", GuideKind::kAlbedo),
+                     own("N", GuideKind::kNormal),
+                     own("DenoisingAlbedo", GuideKind::kAlbedo),
+                     own("DenoisingNormal", GuideKind::kNormal),
                      info.attributes.contains(std::string("covary:") + film_key::kCleanGuides),
-                     find_guide(o.guides, info, GuideKind::kPosition)};
-  if (!guides.albedo) guides.albedo = find_guide(o.guides, info, GuideKind::kAlbedo);
-  if (!guides.normal) guides.normal = find_guide(o.guides, info, GuideKind::kNormal);
+                     find(GuideKind::kPosition)};
+  if (!guides.albedo) guides.albedo = find(GuideKind::kAlbedo);
+  if (!guides.normal) guides.normal = find(GuideKind::kNormal);
   if (!guides.albedo)
     throw Error(ErrorCode::kInput,
                 fmt::format("--guides '{}' has no layer Albedo (Albedo.R, .G, .B) under any known name", o.guides));

@@ -201,6 +201,7 @@ void check_options(const CompareOptions& options) {
   }
   if (!options.denominator.empty() && (options.reference2.empty() || !has_relative_metric(options)))
     usage("--denominator is an option of relmse and relmse-trimmed with --reference2");
+  if (options.overwrite && options.error_map.empty()) usage("--overwrite needs --error-map");
   if (!options.error_range.empty()) {
     if (options.error_map.empty()) usage("--error-range needs --error-map");
     const bool positive = options.metrics[0] == "flip" || options.error_range[0] > 0;
@@ -219,9 +220,8 @@ void check_files(const CompareOptions& options) {
   for (const std::string& path : {options.reference2, options.denominator})
     if (!path.empty()) outputs.reads(path);
   if (options.error_map.empty()) return;
-  if (options.images.size() == 1) return outputs.writes("--error-map", options.error_map, OutputKind::kPng);
   for (const std::string& path : map_paths(options))
-    outputs.writes_derived_png("--error-map", path, "give it another name");
+    outputs.writes_result("--error-map", path, OutputKind::kPng, "compare", options.overwrite);
 }
 
 void compare(const CompareOptions& options) {
@@ -289,6 +289,7 @@ void add_compare(CLI::App& app) {
       ->delimiter(',')
       ->expected(2)
       ->check(finite_number());
+  add_overwrite_option(*command, o->overwrite);
   add_value(*command, "--frames", o->frames, "FIRST-LAST", "Only these frames of out_####.exr; default: all");
   add_value(*command, "--baseline", o->baseline, kFileValue,
             "A sequence (…_####.exr) that a second table is relative to, with the worst region of 32 x 32 pixels");

@@ -17,6 +17,7 @@ struct CompareOptions {
   std::vector<std::string> metrics{"relmse"};
   std::vector<double> error_range;
   std::optional<std::string> json;  // "" and "-": standard output
+  bool overwrite = false;           // of error maps
 };
 
 /// Whether any metric is relative to --denominator or the denoised references, given two.

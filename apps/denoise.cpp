@@ -23,7 +23,7 @@
 #include "declared_options.h"
 #include "denoising/mixed_denoising.h"
 #include "film/denoised_by.h"
-#include "film/image_file.h"
+#include "film/image_rows.h"
 #include "film/outputs.h"
 #include "filters/stray_values.h"
 #include "frame_files.h"
@@ -74,13 +74,14 @@ class GuideLayers {
  public:
   std::optional<Image> albedo, normal, position;
 
-  explicit GuideLayers(const Options& o) {
+  /// `colours`: of the picture.
+  GuideLayers(const Options& o, const ColourSpace& colours) {
     if (o.no_guides) return;
     for (const std::string& path : o.inputs) {
       const ImageInfo info = inspect_image(path);
-      add(path, guide(path, info, o, o.albedo, GuideKind::kAlbedo), albedo, n_albedo_);
-      add(path, guide(path, info, o, o.normal, GuideKind::kNormal), normal, n_normal_);
-      add(path, find_guide(path, info, GuideKind::kPosition, o.layer), position, n_position_);
+      add(path, guide(path, info, o, o.albedo, GuideKind::kAlbedo, colours), albedo, n_albedo_);
+      add(path, guide(path, info, o, o.normal, GuideKind::kNormal, colours), normal, n_normal_);
+      add(path, find_guide(path, info, GuideKind::kPosition, colours, o.layer), position, n_position_);
     }
     divide(albedo, n_albedo_);
     divide(normal, n_normal_);
@@ -97,9 +98,9 @@ class GuideLayers {
 
  private:
   static std::optional<Image> guide(const std::string& path, const ImageInfo& info, const Options& o,
-                                    const std::string& name, GuideKind kind) {
-    if (name.empty()) return find_guide(path, info, kind, o.layer);
-    return named_guide(path, info, name);
+                                    const std::string& name, GuideKind kind, const ColourSpace& colours) {
+    if (name.empty()) return find_guide(path, info, kind, colours, o.layer);
+    return named_guide(path, info, kind, colours, name);
   }
 
   static void add(const std::string& path, std::optional<Image> layer, std::optional<Image>& sum, float& n) {
@@ -239,9 +240,9 @@ void run_one(const Options& o) {
   outputs.writes("--json", o.json, OutputKind::kText);
   ProgressLine progress(std::filesystem::path(o.inputs[0]).stem().string(), o.quiet);
   progress.begin("loading");
-  const GuideLayers guides(o);
   std::optional<GroupedFile> file;
   if (!is_by_network(o)) file.emplace(o.inputs, o.layer);
+  const GuideLayers guides(o, file ? file->colours() : ImageRows(o.inputs[0], o.layer).colours());
   if (file && file->groups() < 2 && !o.mode.empty())
     throw Error(ErrorCode::kUsage, fmt::format("--mode {} needs a second render of another seed, or a film with two "
                                                "groups or more (--groups); '{}' has one",

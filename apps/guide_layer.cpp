@@ -60,15 +60,21 @@ bool is_of(const std::string& picture, const std::string& layer) {
   return of_layer.empty() || of_layer == picture || of_layer == folder(picture);
 }
 
-Image checked_guide(const std::string& path, const std::string& layer) {
-  Image guide = read_image(path, layer, ChecksumPolicy::kCheck, std::nullopt).image;
+/// The space to convert a guide to; none for vectors, even if their components are called R, G and B.
+std::optional<ColourSpace> space_of(GuideKind kind, const ColourSpace& colours) {
+  return kind == GuideKind::kAlbedo ? std::optional(colours) : std::nullopt;
+}
+
+Image checked_guide(const std::string& path, const std::string& layer, const std::optional<ColourSpace>& colours) {
+  Image guide = read_image(path, layer, ChecksumPolicy::kCheck, colours).image;
   check_guide(path + (layer.empty() ? "" : ": the layer " + layer), guide);
   return guide;
 }
 
 /// The pixels of the image at `path` in a separate file.
-Image guide_from_file(const std::string& path, const ImagePlace& place, const std::string& file) {
-  PlacedImage guide = read_image(file, "", ChecksumPolicy::kCheck, std::nullopt);
+Image guide_from_file(const std::string& path, const ImagePlace& place, const std::string& file,
+                      const std::optional<ColourSpace>& colours) {
+  PlacedImage guide = read_image(file, "", ChecksumPolicy::kCheck, colours);
   const CropWindow common = common_window(path, place, place.window, file, guide.place);
   if (!(common == place.window))
     throw Error(ErrorCode::kInput, fmt::format("'{}' has the pixels {}; '{}' needs {}", file,
@@ -81,21 +87,24 @@ Image guide_from_file(const std::string& path, const ImagePlace& place, const st
 }  // namespace
 
 std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, GuideKind kind,
-                                const std::string& picture) {
+                                const ColourSpace& colours, const std::string& picture) {
   std::vector<std::string> layers = image_layers(info.channels);
   if (!picture.empty()) std::erase_if(layers, [&](const std::string& layer) { return !is_of(picture, layer); });
   const std::span<const std::string_view> all[] = {kAlbedo, kNormal, kPosition};
   for (const std::string_view name : all[static_cast<int>(kind)])
     for (const std::string& layer : layers)
-      if (last_part(layer) == name && has_three_channels(info, layer)) return checked_guide(path, layer);
+      if (last_part(layer) == name && has_three_channels(info, layer))
+        return checked_guide(path, layer, space_of(kind, colours));
   return std::nullopt;
 }
 
-Image named_guide(const std::string& path, const ImageInfo& info, const std::string& layer_or_file) {
+Image named_guide(const std::string& path, const ImageInfo& info, GuideKind kind, const ColourSpace& colours,
+                  const std::string& layer_or_file) {
   const std::vector<std::string> layers = image_layers(info.channels);
-  if (std::find(layers.begin(), layers.end(), layer_or_file) != layers.end()) return checked_guide(path, layer_or_file);
-  if (std::filesystem::exists(layer_or_file)) return guide_from_file(path, info.place, layer_or_file);
-  return checked_guide(path, layer_or_file);  // the error lists the layers
+  const bool is_layer = std::find(layers.begin(), layers.end(), layer_or_file) != layers.end();
+  if (!is_layer && std::filesystem::exists(layer_or_file))
+    return guide_from_file(path, info.place, layer_or_file, space_of(kind, colours));
+  return checked_guide(path, layer_or_file, space_of(kind, colours));  // its error lists the layers
 }
 
 }  // namespace covary

@@ -14,13 +14,15 @@ namespace covary {
 enum class GuideKind { kAlbedo, kNormal, kPosition };
 
 /// The guide layer of the image at `path` by the renderers' names (table in docs/other-renderers.md); if there are
-/// several, the first in the table. `picture`: the picture's layer, to which layers of other views do not belong.
-/// Throws like read_image() and check_guide().
+/// several, the first in the table. An albedo is converted to `colours`, the picture's space. `picture`: the picture's
+/// layer, to which layers of other views do not belong. Throws like read_image() and check_guide().
 std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, GuideKind kind,
-                                const std::string& picture = "");
+                                const ColourSpace& colours, const std::string& picture = "");
 
 /// A guide named by the user: a layer of the image at `path`, or a separate file, whose frame must have the same size;
-/// of a larger data window, the pixels of the image. Throws like read_image(), check_guide() and common_window().
-Image named_guide(const std::string& path, const ImageInfo& info, const std::string& layer_or_file);
+/// of a larger data window, the pixels of the image. An albedo is converted to `colours`. Throws like read_image(),
+/// check_guide() and common_window().
+Image named_guide(const std::string& path, const ImageInfo& info, GuideKind kind, const ColourSpace& colours,
+                  const std::string& layer_or_file);
 
 }  // namespace covary

@@ -113,6 +113,8 @@ GroupedFile::GroupedFile(const std::vector<std::string>& paths, const std::strin
   for (const std::string& path : paths) add_file(path, layer, paths.size() == 1);
 }
 
+ColourSpace GroupedFile::colours() const { return layer_colours(files_[0]->colours(), groups_[0].channels); }
+
 void GroupedFile::add_file(const std::string& path, const std::string& layer, bool only_file) {
   files_.push_back(std::make_unique<ExrFile>(path));
   const ExrFile& file = *files_.back();

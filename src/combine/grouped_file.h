@@ -27,7 +27,8 @@ class GroupedFile {
   int width() const { return place_.window.width; }
   int height() const { return place_.window.height; }
   const ImagePlace& place() const { return place_; }
-  const ColourSpace& colours() const { return files_[0]->colours(); }
+  /// Of the channels that are read.
+  ColourSpace colours() const;
   int groups() const { return static_cast<int>(groups_.size()); }
   /// Samples per pixel of all groups together, averaged over pixels; 0 if the files do not say.
   double samples() const { return samples_; }

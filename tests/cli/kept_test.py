@@ -131,6 +131,34 @@ class Results(KeptTest):
                  "b.exr", "-o", "o.exr")
 
 
+    def test_guides_in_other_colours_are_converted(self):
+        """Albedos in files of their own, in Rec. 709, guide as those of the picture's space do."""
+        here = [((0.8, 0.3, 0.2), (0.2, 0.4, 0.7))[x // 3 % 2] for _ in range(SIZE[1]) for x in range(SIZE[0])]
+        there = [in_rec709(colour) for colour in here]
+
+        def layer(name, colours):
+            return {name + c: floats(channel) for c, channel in zip("RGB", zip(*colours))}
+
+        for seed in (1, 2):
+            chance = random.Random(seed)
+            noisy = [[v * chance.expovariate(1) for v in colour] for colour in here]
+            self.write(f"{seed}.exr", exr(layer("", noisy) | layer("Albedo.", here), SIZE, more=ACES_CG))
+        self.write("rec709.exr", exr(layer("", there) | layer("Albedo.", there), SIZE))
+        self.write("untold.exr", exr(layer("", there) | layer("Albedo.", there), SIZE, more=ACES_CG))
+
+        def result(*command):
+            self.good(*command, "--oidn", "off", "-o", "o.exr", "--overwrite")
+            found = self.read("o.exr")[0]
+            return [v for c in "RGB" for v in found[c]]
+
+        for command, option in ((("denoise", "1.exr", "2.exr"), "--albedo"),
+                                (("combine", "--independent", "1.exr", "2.exr", "--denoise", "auto"), "--guides")):
+            own = result(*command, *(() if option == "--albedo" else (option, "1.exr")))
+            converted, as_stored = (result(*command, option, name) for name in ("rec709.exr", "untold.exr"))
+            self.assertLess(max(abs(x - y) for x, y in zip(own, converted)), 1e-3 * max(own), option)
+            self.assertGreater(max(abs(x - y) for x, y in zip(own, as_stored)), 1e-2 * max(own), "the test sees colours")
+
+
 class Convert(KeptTest):
     def test_exr_stays_what_it_is(self):
         a = self.render("a.exr", 1, more=ACES_CG, window=(3, 2) + SIZE)

@@ -64,13 +64,17 @@ class Overwriting(OutputsTest):
         self.image("r.exr", (1, 1, 1))
         maps = ("compare", "a.exr", "b.exr", "-r", "r.exr", "--error-map", "m.png")
         self.write("m-b.png", b"a photograph")
-        self.bad(2, "--error-map would replace 'm-b.png', which covary did not make; give it another name", *maps)
-        (self.path / "m-b.png").unlink()
-        self.good(*maps)
+        refused = "already exists, and 'covary compare' did not make it; give another name, or --overwrite"
+        self.bad(2, f"--error-map 'm-b.png' {refused}", *maps)
+        self.assertFalse((self.path / "m-a.png").exists(), "nothing is written before all names are checked")
+        self.good(*maps, "--overwrite")
         self.good(*maps)  # its own
-        # A name that was given in full may be replaced.
         self.write("given.png", b"a photograph")
-        self.good("compare", "a.exr", "-r", "r.exr", "--error-map", "given.png")
+        one = ("compare", "a.exr", "-r", "r.exr", "--error-map", "given.png")
+        self.bad(2, f"--error-map 'given.png' {refused}", *one)
+        self.assertEqual((self.path / "given.png").read_bytes(), b"a photograph")
+        self.good(*one, "--overwrite")
+        self.bad(2, "--overwrite needs --error-map", *one[:4], "--overwrite")
 
     def test_convert_replaces_only_its_own(self):
         before = (self.path / "b.exr").read_bytes()
