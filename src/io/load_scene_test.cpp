@@ -308,8 +308,10 @@ TEST_F(LoadScene, ReportsMistakesOfEqualTexturesOnce) {
 <bsdf type="diffuse"><texture name="reflectance" type="checkerboard"><float name="size" value="3"/></texture></bsdf>
 <bsdf type="diffuse"><texture name="reflectance" type="checkerboard"><float name="size" value="3"/></texture></bsdf>
 <bsdf type="diffuse"><texture name="reflectance" type="checkerboard"><float name="size" value="4"/></texture></bsdf>)"),
-            "scene.xml:6:70: unknown parameter 'size' of texture 'checkerboard'; known: 'color0', 'color1', 'to_uv'\n"
-            "scene.xml:8:70: unknown parameter 'size' of texture 'checkerboard'; known: 'color0', 'color1', 'to_uv'");
+            "scene.xml:6:70: unknown parameter 'size' of texture 'checkerboard'; known: 'color0', 'color1', "
+            "'dimension', 'to_uv', 'to_world'\n"
+            "scene.xml:8:70: unknown parameter 'size' of texture 'checkerboard'; known: 'color0', 'color1', "
+            "'dimension', 'to_uv', 'to_world'");
 }
 
 TEST_F(LoadScene, GivesEveryEmittingShapeItsOwnLight) {

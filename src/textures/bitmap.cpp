@@ -6,7 +6,8 @@
 // | filename    | string    | required | PNG, JPEG, EXR, HDR, PFM, TGA, BMP, …; alpha is ignored                      |
 // | raw         | boolean   | false    | values are data, not colours: integers are not decoded from sRGB             |
 // | filter_type | string    | bilinear | `bilinear` or `nearest`                                                      |
-// | wrap_mode   | string    | repeat   | outside [0, 1]: `repeat`, `mirror` or `clamp`                                |
+// | wrap_mode   | string    | repeat   | outside [0, 1]: `repeat`, `mirror`, `clamp` or, our own, `black`             |
+// | gamma       | float     | 0        | our own: if positive, integers are decoded by this power                     |
 // | to_uv       | transform | identity | from surface parameters to texture coordinates                               |
 // | grey        | string    | luminance | one channel of colours, or `alpha_or_mean`, as in pbrt                      |
 // | format      | string    | auto     | accepted for compatibility; bytes stay bytes, other files become floats      |
@@ -141,6 +142,7 @@ inline AxisCell find_cell(float u, int n, WrapMode wrap) {
       if (u > 1) u = 2 - u, direction = -1;
       break;
     case WrapMode::kClamp:
+    case WrapMode::kBlack:
       u = clamp01(u);
       break;
   }
@@ -213,6 +215,7 @@ class Bitmap final : public Texture {
  private:
   Value lookup(Vec2 uv) const {
     const Vec2 st = settings_.to_uv.apply(uv);
+    if (settings_.wrap == WrapMode::kBlack && !(st.x >= 0 && st.x <= 1 && st.y >= 0 && st.y <= 1)) return Value(0);
     const AxisCell x = find_cell(st.x, width_, settings_.wrap), y = find_cell(st.y, height_, settings_.wrap);
     if (settings_.filter == FilterType::kNearest) return texels_.value(layout_.index(nearest(x), nearest(y)));
     const size_t row0 = layout_.row_offset(y.i0), row1 = layout_.row_offset(y.i1);
@@ -279,6 +282,11 @@ std::shared_ptr<Texture> wrap_texels(Texels texels, const TexelImage& image, con
 }  // namespace
 
 std::shared_ptr<Texture> make_bitmap_texture(TexelImage image, const BitmapSettings& settings) {
+  if (settings.gamma > 0 && image.srgb) {  // as floats: rare, and byte images keep their tables
+    for (const uint8_t byte : image.bytes) image.floats.push_back(static_cast<float>(byte) / 255);
+    image.bytes.clear(), image.srgb = false;
+    for (float& value : image.floats) value = std::pow(std::max(value, 0.0f), settings.gamma);
+  }
   const bool decode = image.srgb && !settings.raw;
   const BlockLayout layout(image.width, image.height);
   if (!image.bytes.empty()) {
@@ -300,8 +308,12 @@ std::shared_ptr<Texture> make_bitmap(Parameters& parameters) {
   settings.filter = parameters.get_choice("filter_type", "bilinear", {"bilinear", "nearest"}) == "nearest"
                         ? FilterType::kNearest
                         : FilterType::kBilinear;
-  const std::string wrap = parameters.get_choice("wrap_mode", "repeat", {"repeat", "mirror", "clamp"});
-  settings.wrap = wrap == "mirror" ? WrapMode::kMirror : (wrap == "clamp" ? WrapMode::kClamp : WrapMode::kRepeat);
+  const std::string wrap = parameters.get_choice("wrap_mode", "repeat", {"repeat", "mirror", "clamp", "black"});
+  settings.wrap = wrap == "mirror"  ? WrapMode::kMirror
+                  : wrap == "clamp" ? WrapMode::kClamp
+                  : wrap == "black" ? WrapMode::kBlack
+                                    : WrapMode::kRepeat;
+  settings.gamma = parameters.get_float("gamma", 0, 0, 10);
   settings.to_uv = UvTransform(parameters.get_transform("to_uv"));
   const bool mean = parameters.get_choice("grey", "luminance", {"luminance", "alpha_or_mean"}) == "alpha_or_mean";
   parameters.get_choice("format", "auto", {"auto", "variant", "float16", "fp16", "uint8"});

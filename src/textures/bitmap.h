@@ -9,11 +9,12 @@
 
 namespace covary {
 
-enum class WrapMode { kRepeat, kMirror, kClamp };
+enum class WrapMode { kRepeat, kMirror, kClamp, kBlack };
 enum class FilterType { kBilinear, kNearest };
 
 struct BitmapSettings {
   bool raw = false;  ///< integer files hold linear values: no sRGB decoding
+  float gamma = 0;   ///< if positive, integers are decoded by this power instead of sRGB's curve
   FilterType filter = FilterType::kBilinear;
   WrapMode wrap = WrapMode::kRepeat;
   UvTransform to_uv;  ///< from surface parameters to texture coordinates

@@ -7,8 +7,9 @@ namespace covary {
 
 // clang-format off
 #define COVARY_TEXTURES(PLUGIN, T) \
-  PLUGIN(T, bitmap) PLUGIN(T, checkerboard) PLUGIN(T, mesh_attribute) PLUGIN(T, rawconstant) PLUGIN(T, scale) \
-  PLUGIN(T, uniform) PLUGIN(T, vertexcolor)
+  PLUGIN(T, bilerp) PLUGIN(T, bitmap) PLUGIN(T, checkerboard) PLUGIN(T, dots) PLUGIN(T, mesh_attribute) \
+  PLUGIN(T, mix) PLUGIN(T, noise) PLUGIN(T, projected) PLUGIN(T, rawconstant) PLUGIN(T, scale) PLUGIN(T, uniform) \
+  PLUGIN(T, vertexcolor)
 // clang-format on
 
 COVARY_PLUGINS(Texture, texture_plugins, COVARY_TEXTURES)
