@@ -67,6 +67,7 @@ const Vec2 kSteep{0.9f, -0.5f}, kVerySteep{2.5f, 1};
 
 const Case kCases[] = {
     {"diffuse", kDiffuse},
+    {"difftrans", {{"type", "difftrans"}, {"reflectance", rgb(0.2, 0.4, 0.6)}, {"transmittance", rgb(0.3, 0.1, 0.2)}}},
     {"conductor", kMirror},
     {"roughconductor", kMetal},
     {"plastic", kPlastic},

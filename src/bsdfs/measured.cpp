@@ -3,14 +3,16 @@
 //
 // | name     | type   | default  | meaning                                                      |
 // |----------|--------|----------|--------------------------------------------------------------|
-// | filename | string | required | a file of the database in RGB, *_rgb.bsdf: see tensor_file.h |
+// | filename | string | required | a file of the database, in RGB or spectral: see tensor_file.h |
 //
 // With m the half vector, u(m) its angles on the unit square and s the point that the warp of visible normals maps to
 // u(m), all for the direction of the camera,
 //     f cos = spectra(s) D(u(m)) / (4 sigma),            [DupuyJakob2018], as in Mitsuba,
 // or spectra(s) alone if the file says so. Samples are drawn from the luminance over s, then warped to visible normals.
 // Tables are bilinear, and interpolated linearly between the measured camera directions, so the model is not quite
-// reciprocal, and light paths get its adjoint. Negative channels are clamped to 0.
+// reciprocal, and light paths get its adjoint. Negative channels are clamped to 0. Spectra are converted to RGB like
+// other reflectances: each wavelength of the file adds its share, the colour of a spectrum that is 1 there and falls to
+// 0 at its neighbours.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -167,8 +169,6 @@ class MaterialFile {
   explicit MaterialFile(const std::string& path) : path_(path), file_(path) {}
 
   Material read() const {
-    if (file_.has("wavelengths"))
-      throw refusal("holds spectra; rendering is in RGB: use the file of this material that ends in _rgb.bsdf");
     if (file_.has("M")) throw refusal("holds a polarised measurement; light is not polarised here");
     Material m;
     m.nodes.a = read_nodes("phi_i", -2 * kTwoPi, 2 * kTwoPi);
@@ -177,8 +177,10 @@ class MaterialFile {
     expect("ndf", {0, 0}), expect("sigma", {0, 0});
     expect("vndf", {n_phi, n_theta, 0, 0}), expect("luminance", {n_phi, n_theta, 0, 0});
     const GridSize of_spectra = grid("luminance");
-    expect("rgb",
-           {n_phi, n_theta, 3, static_cast<uint64_t>(of_spectra.height), static_cast<uint64_t>(of_spectra.width)});
+    const bool spectral = file_.has("wavelengths");
+    const std::vector<Spectrum> channels = spectral ? wavelength_colours() : rgb_colours();
+    expect(spectral ? "spectra" : "rgb", {n_phi, n_theta, channels.size(), static_cast<uint64_t>(of_spectra.height),
+                                          static_cast<uint64_t>(of_spectra.width)});
     expect("jacobian", {1});
     // The tables of visible normals and luminance are stored with two cumulative sums each.
     require_memory(path_, "a measured material", 3.0 * static_cast<double>(file_.n_bytes()));
@@ -193,7 +195,7 @@ class MaterialFile {
     m.sigma = {file_.floats("sigma"), grid("sigma")};
     m.visible_normals = warp("vndf");
     m.luminance = warp("luminance");
-    m.spectra = {colours(m.nodes.n_slices(), of_spectra.n()), of_spectra};
+    m.spectra = {colours(spectral ? "spectra" : "rgb", channels, m.nodes.n_slices(), of_spectra.n()), of_spectra};
     return m;
   }
 
@@ -231,13 +233,35 @@ class MaterialFile {
       throw refusal(error.what());
     }
   }
-  /// The file stores planar channels; interleaves them.
-  std::vector<Spectrum> colours(size_t n_slices, size_t n) const {
-    const std::vector<float> planes = file_.floats("rgb");
+  static std::vector<Spectrum> rgb_colours() { return {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}; }
+  /// What one unit at each wavelength adds to the colour of a reflectance.
+  std::vector<Spectrum> wavelength_colours() const {
+    constexpr uint64_t kMost = 1024;
+    const std::vector<float> nm = file_.floats("wavelengths");
+    bool right = nm.size() >= 2 && nm.size() <= kMost;
+    for (size_t i = 1; right && i < nm.size(); ++i) right = nm[i - 1] < nm[i];
+    if (!right) throw refusal("has a field 'wavelengths' that is not a list of increasing wavelengths");
+    std::vector<Spectrum> result;
+    for (size_t i = 0; i < nm.size(); ++i) {
+      // Differences of spectra, because conversions clamp what is below 0.
+      SampledSpectrum with, without;
+      for (size_t k = 0; k < nm.size(); ++k) {
+        without.samples.emplace_back(nm[k], 1.0f);
+        with.samples.emplace_back(nm[k], k == i ? 2.0f : 1.0f);
+      }
+      result.push_back(spectrum_to_rgb(with, SpectrumRole::kIndex) - spectrum_to_rgb(without, SpectrumRole::kIndex));
+    }
+    return result;
+  }
+  /// The file stores planar channels, or one plane for each wavelength.
+  std::vector<Spectrum> colours(const std::string& field, const std::vector<Spectrum>& channels, size_t n_slices,
+                                size_t n) const {
+    const std::vector<float> planes = file_.floats(field);
     std::vector<Spectrum> result(n_slices * n);
     for (size_t slice = 0; slice < n_slices; ++slice)
-      for (int c = 0; c < 3; ++c)
-        for (size_t i = 0; i < n; ++i) result[slice * n + i][c] = planes[(slice * 3 + c) * n + i];
+      for (size_t c = 0; c < channels.size(); ++c)
+        for (size_t i = 0; i < n; ++i)
+          result[slice * n + i] += channels[c] * planes[(slice * channels.size() + c) * n + i];
     return result;
   }
 

@@ -92,6 +92,23 @@ TEST(Measured, WithoutNormalsSpectraAreTheValue) {
   EXPECT_EQ(Bound(measured(write(plain_fields(1))), below)->eval(below, wi).pdf_solid_angle, 0);
 }
 
+/// A spectral file has the colour that spectrum_to_rgb() gives its spectra.
+TEST(Measured, SpectraBecomeColours) {
+  const std::vector<float> wavelengths = {380, 450, 520, 600, 700}, spectrum = {0.2f, 0.3f, 0.9f, 0.5f, 0.4f};
+  auto fields = plain_fields(0);
+  fields.push_back(float_field("wavelengths", {5}, wavelengths));
+  std::vector<float> slices;  // two camera angles, of which each holds all wavelengths
+  for (int slice = 0; slice < 2; ++slice)
+    for (const float value : spectrum) slices.insert(slices.end(), 4, value);
+  fields[6] = float_field("spectra", {1, 2, 5, 2, 2}, slices);
+  SampledSpectrum expected;
+  for (size_t i = 0; i < 5; ++i) expected.samples.emplace_back(wavelengths[i], spectrum[i]);
+  const Spectrum rgb = spectrum_to_rgb(expected, SpectrumRole::kReflectance);
+  const Vec3 wo = direction(30, 0), wi = direction(60, 1);
+  const Spectrum found = Bound(measured(write(fields)), wo)->eval(wo, wi).value;
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(found[c], rgb[c], 1e-4f);
+}
+
 TEST(Measured, WrongFilesAreNamed) {
   const auto plain = plain_fields(1);
   expect_contains(bsdf_errors({{"type", "measured"}}), "bsdf 'measured': the string 'filename' is missing");
@@ -99,7 +116,7 @@ TEST(Measured, WrongFilesAreNamed) {
   expect_contains(bsdf_errors(measured(kFolder + "bsdfs.json")), "is not a tensor file");
   auto spectral = plain;
   spectral.push_back(float_field("wavelengths", {1}, {500}));
-  expect_contains(bsdf_errors(measured(write(spectral))), "use the file of this material that ends in _rgb.bsdf");
+  expect_contains(bsdf_errors(measured(write(spectral))), "not a list of increasing wavelengths");
   expect_contains(bsdf_errors(measured(write({float_field("M", {1}, {1})}))), "holds a polarised measurement");
   expect_contains(bsdf_errors(measured(write({plain[0], plain[1]}))), "has no field 'ndf'");
   expect_contains(errors(plain, 2, float_field("ndf", {4}, {1, 1, 1, 1})),

@@ -9,13 +9,13 @@
 // | ext_ior              | number/string  | air           | index of refraction outside; must differ from int_ior  |
 // | specular_reflectance | colour/texture | 1             | factor on the coating's reflection                     |
 // | distribution         | string         | beckmann      | distribution of microfacet normals: beckmann or ggx    |
-// | alpha                | number         | 0.1           | roughness                                              |
-// | sample_visible       | bool           | true          | see roughness.h                                        |
+// | alpha, alpha_u, alpha_v, sample_visible |  |            | see roughness.h                                        |
 //
 // Like plastic.cpp, with the transmittance T of the rough interface in place of 1 - F:
 //     f_diffuse = T(wi) T(wo) rho / (pi eta^2 (1 - rho Ri)).
 // T(cos) is tabulated at construction by quadrature over the visible normals; Ri is the mean internal reflectance, by
-// the same quadrature. Models with the same interface share a table.
+// the same quadrature. Models with the same interface share a table. Where alpha varies, or differs along u and v, T is
+// that of the nearest of 16 isotropic ones.
 #include <array>
 #include <map>
 #include <memory>
@@ -147,28 +147,50 @@ class RoughPlasticClosure final : public CoatedClosure<RoughPlasticClosure> {
 
 class RoughPlastic final : public CoatedBsdf {
  public:
-  RoughPlastic(const RoughnessInput& roughness, Parameters& p)
+  RoughPlastic(RoughnessInput roughness, Parameters& p)
       : CoatedBsdf(p),
-        surface_(roughness.eval({})),
+        roughness_(std::move(roughness)),
+        varies_(!roughness_.alpha_u.is_constant() || !roughness_.alpha_v.is_constant()),
+        surface_(varies_ ? RoughSurface{Microfacet(roughness_.type, 0.1f, 0.1f), true} : roughness_.eval({})),
         eta_(get_relative_ior(p, "polypropylene")),
         nonlinear_(p.get_bool("nonlinear", false)) {
     check_index(eta_, p);
-    if (eta_ != 1) transmittance_ = shared_transmittance(surface_.normals, eta_);
+    if (eta_ == 1) return;
+    if (!varies_ && !roughness_.anisotropic) {
+      tables_ = {shared_transmittance(surface_.normals, eta_)};
+      return;
+    }
+    for (int i = 0; i < kTables; ++i) {
+      const float alpha = (static_cast<float>(i) + 0.5f) / kTables;
+      tables_.push_back(shared_transmittance(Microfacet(surface_.normals.type(), alpha, alpha), eta_));
+    }
   }
 
   uint32_t flags() const override { return kGlossyReflection | kDiffuseReflection; }
+  bool needs_derivatives() const override { return roughness_.anisotropic; }
   const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode, Arena& arena) const override {
+    const RoughSurface surface = varies_ ? roughness_.eval(hit) : surface_;
+    const RoughTransmittance& transmittance = table(surface.normals);
     const Spectrum rho = diffuse_.eval(hit);
-    const float internal = transmittance_->internal_reflectance();
+    const float internal = transmittance.internal_reflectance();
     const Spectrum trapped = nonlinear_ ? rho * internal : Spectrum(internal);
     const Spectrum base = rho * kInvPi / ((Spectrum(1) - trapped) * sqr(eta_));
-    return arena.make<RoughPlasticClosure>(surface_, *transmittance_, eta_, specular_weight_, base,
-                                           specular_.eval(hit));
+    return arena.make<RoughPlasticClosure>(surface, transmittance, eta_, specular_weight_, base, specular_.eval(hit));
   }
 
  private:
-  RoughSurface surface_;
-  std::shared_ptr<const RoughTransmittance> transmittance_;
+  static constexpr int kTables = 16;
+
+  const RoughTransmittance& table(const Microfacet& normals) const {
+    if (tables_.size() == 1) return *tables_[0];
+    const float alpha = std::sqrt(normals.alpha_u() * normals.alpha_v());
+    return *tables_[static_cast<size_t>(std::clamp(static_cast<int>(alpha * kTables), 0, kTables - 1))];
+  }
+
+  RoughnessInput roughness_;
+  bool varies_;
+  RoughSurface surface_;  // unless it varies
+  std::vector<std::shared_ptr<const RoughTransmittance>> tables_;
   float eta_;
   bool nonlinear_;
 };
@@ -176,10 +198,7 @@ class RoughPlastic final : public CoatedBsdf {
 }  // namespace
 
 std::shared_ptr<Bsdf> make_roughplastic(Parameters& parameters) {
-  const RoughnessInput roughness = get_roughness(parameters);
-  if (roughness.anisotropic || !roughness.alpha_u.is_constant())
-    parameters.error_at(roughness.anisotropic ? "alpha_u" : "alpha", "is not one number; expected one number 'alpha'");
-  return std::make_shared<RoughPlastic>(roughness, parameters);
+  return std::make_shared<RoughPlastic>(get_roughness(parameters), parameters);
 }
 
 }  // namespace covary

@@ -62,9 +62,22 @@ TEST(RoughPlastic, EachInterfaceHasItsOwnTransmittance) {
     EXPECT_GT(std::abs(other / same - 1), 1e-3f);
 }
 
+/// At the roughness of a table, 3.5 / 16, nothing differs; between tables, and along u and v, samples keep to the
+/// density.
+TEST(RoughPlastic, MayBeRougherAlongOneAxis) {
+  const Vec3 wo = direction(50, 0.3f), wi = direction(40, 2.5f);
+  const auto value = [&](const Json& more) {
+    Json model{{"type", "roughplastic"}, {"distribution", "ggx"}};
+    model.update(more);
+    return Bound(model, wo)->eval(wo, wi).value.g;
+  };
+  EXPECT_FLOAT_EQ(value({{"alpha_u", 0.21875}, {"alpha_v", 0.21875}}), value({{"alpha", 0.21875}}));
+  const Json stretched{{"type", "roughplastic"}, {"distribution", "ggx"}, {"alpha_u", 0.1}, {"alpha_v", 0.4}};
+  expect_sound(stretched, {10, 70});
+  EXPECT_NE(value({{"alpha_u", 0.1}, {"alpha_v", 0.4}}), value({{"alpha_u", 0.4}, {"alpha_v", 0.1}}));
+}
+
 TEST(RoughPlastic, WrongParametersAreNamed) {
-  expect_contains(bsdf_errors({{"type", "roughplastic"}, {"alpha_u", 0.1}, {"alpha_v", 0.2}}),
-                  "is not one number; expected one number 'alpha'");
   expect_contains(bsdf_errors({{"type", "roughplastic"}, {"int_ior", "air"}}), "they must differ");
 }
 
