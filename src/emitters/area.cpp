@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // `area`: an emissive surface, nested in a shape.
 //
-// | parameter | type            | default | meaning                                                   |
-// |-----------|-----------------|---------|-----------------------------------------------------------|
-// | radiance  | colour, texture | 1       | emitted on the side of the shape's (perhaps flipped) normal |
+// | parameter    | type            | default | meaning                                                        |
+// |--------------|-----------------|---------|----------------------------------------------------------------|
+// | radiance     | colour, texture | 1       | emitted on the side of the shape's (perhaps flipped) normal    |
+// | two_sided    | boolean         | false   | our own: emitted on both sides                                 |
+// | power        | float           | none    | our own: `radiance` times the radiance that has this power     |
+// | per_triangle | boolean         | false   | `power` is that of the mean triangle of a mesh                 |
 #include "emitters/area.h"
 
 #include "core/warp.h"
@@ -21,36 +24,50 @@ Vec3 front_normal(const SurfaceHit& hit) { return dot(hit.ng, hit.frame.n) < 0 ?
 
 }  // namespace
 
-AreaLight::AreaLight(TexturePtr radiance) : radiance_(std::move(radiance)), textured_(!radiance_->is_constant()) {
-  if (!textured_) constant_ = radiance_->eval(SurfaceHit{});
+AreaLight::AreaLight(AreaLightSettings settings)
+    : settings_(std::move(settings)), textured_(!settings_.radiance->is_constant()) {
+  if (!textured_) constant_ = radiance().eval(SurfaceHit{});
 }
 
 void AreaLight::attach(const Shape* shape) {
   COVARY_CHECK(shape != nullptr && shape_ == nullptr, "an area light belongs to exactly one shape");
   shape_ = shape;
+  const bool plain = !textured_ && !settings_.two_sided && !(settings_.power > 0);
   samples_uv_ = textured_ && shape->sample_uv({0.5f, 0.5f}).pdf_area > 0;
-  if (const auto* mesh = dynamic_cast<const TriangleMesh*>(shape); mesh && !textured_ && mesh->parallelogram())
+  if (const auto* mesh = dynamic_cast<const TriangleMesh*>(shape); mesh && plain && mesh->parallelogram())
     parallelogram_ = {*mesh->parallelogram(), constant_};
-  if (const auto* sphere = dynamic_cast<const Sphere*>(shape); sphere && !textured_)
-    sphere_ = {sphere->ball(), constant_};
+  if (const auto* sphere = dynamic_cast<const Sphere*>(shape); sphere && plain) sphere_ = {sphere->ball(), constant_};
 }
 
 Spectrum AreaLight::surface_radiance(const SurfaceHit& hit, const Vec3& w) const {
-  if (!(dot(front_normal(hit), w) > 0)) return Spectrum();
-  return textured_ ? radiance_->eval(hit) : constant_;
+  if (!settings_.two_sided && !(dot(front_normal(hit), w) > 0)) return Spectrum();
+  return textured_ ? radiance().eval(hit) * scale() : constant();
 }
 
 Spectrum AreaLight::radiance_at(const AreaSample& at) const {
-  if (!textured_) return constant_;
+  if (!textured_) return constant();
   SurfaceHit hit;
   hit.p = at.p, hit.ng = at.n, hit.frame = Frame(at.n), hit.uv = at.uv, hit.shape = shape_;
   hit.primitive = at.primitive, hit.barycentric = at.barycentric;
-  return radiance_->eval(hit);
+  return radiance().eval(hit) * scale();
+}
+
+float AreaLight::scale() const {
+  if (!(settings_.power > 0)) return 1;
+  const auto n = settings_.per_triangle ? static_cast<float>(shape_->n_primitives()) : 1.0f;
+  return settings_.power * n / (kPi * n_sides() * shape_->area());
+}
+
+bool AreaLight::emits_towards(EmitterSample& sample) const {
+  if (!(sample.pdf_solid_angle > 0)) return false;
+  const float cosine = dot(sample.n, sample.wi);
+  if (settings_.two_sided && cosine > 0) sample.n = -sample.n;
+  return settings_.two_sided ? cosine != 0 : cosine < 0;
 }
 
 AreaSample AreaLight::sample_position(Vec2 u, float u_primitive) const {
   if (!samples_uv_) return shape_->sample_area(u, u_primitive);
-  const Texture::PositionSample position = radiance_->sample_position(u);
+  const Texture::PositionSample position = radiance().sample_position(u);
   AreaSample area = shape_->sample_uv(position.uv);
   area.pdf_area *= position.pdf;
   return area;
@@ -62,14 +79,13 @@ EmitterSample AreaLight::sample_towards(const Vec3& reference, Vec2 u, float u_p
   if (samples_uv_ || (textured_ && shape_->has_attributes()))
     return towards(reference, sample_position(u, u_primitive));
   EmitterSample sample = shape_->sample_towards(reference, u, u_primitive);
-  if (sample.pdf_solid_angle > 0 && dot(sample.n, sample.wi) < 0)
-    sample.radiance = radiance_at({sample.p, sample.n, sample.uv});
+  if (emits_towards(sample)) sample.radiance = radiance_at({sample.p, sample.n, sample.uv});
   return sample;
 }
 
 EmitterSample AreaLight::towards(const Vec3& reference, const AreaSample& at) const {
   EmitterSample sample = Shape::towards(reference, at);
-  if (sample.pdf_solid_angle > 0 && dot(sample.n, sample.wi) < 0) sample.radiance = radiance_at(at);
+  if (emits_towards(sample)) sample.radiance = radiance_at(at);
   return sample;
 }
 
@@ -93,13 +109,18 @@ float AreaLight::pdf_solid_angle(const Vec3& reference, const SurfaceHit& hit) c
   const Vec3 d = hit.p - reference;
   const float distance_squared = length_squared(d);
   const float cosine = std::abs(dot(d, hit.ng)) / std::sqrt(distance_squared);
-  const float pdf_area = radiance_->pdf_position(hit.uv) * shape_->sample_uv(hit.uv).pdf_area;
+  const float pdf_area = radiance().pdf_position(hit.uv) * shape_->sample_uv(hit.uv).pdf_area;
   return cosine > 0 ? pdf_area * distance_squared / cosine : 0;
 }
 
 EmissionSample AreaLight::sample_emission(Vec2 u_position, Vec2 u_direction, float u_primitive) const {
   EmissionSample sample;
-  const AreaSample area = sample_position(u_position, u_primitive);
+  AreaSample area = sample_position(u_position, u_primitive);
+  if (settings_.two_sided) {
+    const bool back = u_direction.x >= 0.5f;
+    u_direction.x = std::min(2 * u_direction.x - (back ? 1.0f : 0.0f), kOneMinusEpsilon);
+    if (back) area.n = -area.n;
+  }
   const Vec3 w = warp::square_to_cosine_hemisphere(u_direction);
   if (!(area.pdf_area > 0) || !(w.z > 0)) return sample;
   sample.ray = {area.p, Frame(area.n).to_world(w)};
@@ -108,14 +129,16 @@ EmissionSample AreaLight::sample_emission(Vec2 u_position, Vec2 u_direction, flo
   sample.uv = area.uv;
   sample.radiance = radiance_at(area);
   sample.pdf_position = area.pdf_area;
-  sample.pdf_direction = warp::cosine_hemisphere_pdf_solid_angle(w.z);
+  sample.pdf_direction = warp::cosine_hemisphere_pdf_solid_angle(w.z) / n_sides();
   return sample;
 }
 
 EmissionPdf AreaLight::pdf_emission(const SurfaceHit& hit, const Vec3& w) const {
   const float position =
-      samples_uv_ ? radiance_->pdf_position(hit.uv) * shape_->sample_uv(hit.uv).pdf_area : 1 / shape_->area();
-  return {position, warp::cosine_hemisphere_pdf_solid_angle(dot(front_normal(hit), w))};
+      samples_uv_ ? radiance().pdf_position(hit.uv) * shape_->sample_uv(hit.uv).pdf_area : 1 / shape_->area();
+  const float cosine = dot(front_normal(hit), w);
+  return {position,
+          warp::cosine_hemisphere_pdf_solid_angle(settings_.two_sided ? std::abs(cosine) : cosine) / n_sides()};
 }
 
 template <typename Position>
@@ -128,25 +151,29 @@ Spectrum AreaLight::power_of(int n_points, const Position& position) const {
     const Spectrum radiance = radiance_at(at);
     for (int c = 0; c < 3; ++c) sum[c] += radiance[c] / at.pdf_area;
   }
-  const double scale = static_cast<double>(kPi) / n_points;
+  const double scale = static_cast<double>(kPi * n_sides()) / n_points;
   return {static_cast<float>(sum[0] * scale), static_cast<float>(sum[1] * scale), static_cast<float>(sum[2] * scale)};
 }
 
 Spectrum AreaLight::power() const {
-  if (!textured_) return constant_ * (kPi * shape_->area());
+  if (!textured_) return constant() * (kPi * n_sides() * shape_->area());
   return power_of(4096, [&](Vec2 u, float u_primitive) { return sample_position(u, u_primitive); });
 }
 
 Spectrum AreaLight::part_power(uint32_t part) const {
   if (n_parts() == 1) return power();
-  if (!textured_) return constant_ * (kPi * shape_->part_area(part));
+  if (!textured_) return constant() * (kPi * n_sides() * shape_->part_area(part));
   return power_of(64, [&](Vec2 u, float) { return shape_->sample_part(part, u); });
 }
 
 std::shared_ptr<Emitter> make_area(Parameters& parameters) {
-  TexturePtr radiance = parameters.get_texture("radiance", Spectrum(1), SpectrumRole::kEmission);
-  if (!radiance) return nullptr;  // already reported
-  return std::make_shared<AreaLight>(std::move(radiance));
+  AreaLightSettings settings;
+  settings.radiance = parameters.get_texture("radiance", Spectrum(1), SpectrumRole::kEmission);
+  settings.two_sided = parameters.get_bool("two_sided", false);
+  settings.power = parameters.get_float("power", 0, 0);
+  settings.per_triangle = parameters.get_bool("per_triangle", false);
+  if (!settings.radiance) return nullptr;  // already reported
+  return std::make_shared<AreaLight>(std::move(settings));
 }
 
 }  // namespace covary

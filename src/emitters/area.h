@@ -16,18 +16,26 @@
 
 namespace covary {
 
+struct AreaLightSettings {
+  TexturePtr radiance;     ///< not null
+  bool two_sided = false;  ///< emits on the side of the shading normal, or on both
+  float power = 0;         ///< if positive, the factor on the radiance is such that 1 would emit this in all
+  /// `power` is that of each triangle of a mesh, if all are of the same area, as in pbrt.
+  bool per_triangle = false;
+};
+
 class AreaLight final : public Emitter {
  public:
-  /// `radiance` must not be null. Emits uniformly over the hemisphere of the geometric normal on the side of the
-  /// shading normal.
-  explicit AreaLight(TexturePtr radiance);
+  /// Emits uniformly over the hemispheres.
+  explicit AreaLight(AreaLightSettings settings);
+  explicit AreaLight(TexturePtr radiance) : AreaLight(AreaLightSettings{std::move(radiance)}) {}
 
   /// Sets the shape that emits; call once, when the shape is complete, before anything else but clone(). `shape` must
   /// outlive the light.
   void attach(const Shape* shape);
   /// The same light without a shape.
   std::shared_ptr<AreaLight> clone() const {
-    const auto light = std::make_shared<AreaLight>(radiance_);
+    const auto light = std::make_shared<AreaLight>(settings_);
     light->set_group(group());
     return light;
   }
@@ -62,8 +70,16 @@ class AreaLight final : public Emitter {
   template <typename Position>
   Spectrum power_of(int n_points, const Position& position) const;
 
-  TexturePtr radiance_;
-  Spectrum constant_;  // the radiance if it does not vary
+  const Texture& radiance() const { return *settings_.radiance; }
+  /// Factor by `power`; not known before the shape is prepared.
+  float scale() const;
+  Spectrum constant() const { return constant_ * scale(); }
+  float n_sides() const { return settings_.two_sided ? 2 : 1; }
+  /// Turns the sample's normal towards `reference`, if that side emits; false if it does not.
+  bool emits_towards(EmitterSample& sample) const;
+
+  AreaLightSettings settings_;
+  Spectrum constant_;  // the radiance if it does not vary, before scale()
   bool textured_;
   bool samples_uv_ = false;
   const Shape* shape_ = nullptr;

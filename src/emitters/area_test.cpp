@@ -385,5 +385,39 @@ TEST(AreaLight, IsMadeFromParameters) {
   EXPECT_EQ(wrong.errors, "test.xml:2:1: unknown parameter 'to_world' of emitter 'area'; known: 'radiance'");
 }
 
+/// Both sides shine alike; light paths start on either, with the densities that pdf_emission() states.
+TEST(AreaLight, MayShineOnBothSides) {
+  const auto shape = rectangle(Transform());
+  AreaLight light({constant(), true});
+  light.attach(shape.get());
+  SurfaceHit hit;
+  hit.ng = {0, 0, 1}, hit.frame = Frame({0, 0, 1});
+  int n_behind = 0;
+  for (int i = 0; i < 64; ++i) {
+    const float x = (static_cast<float>(i) + 0.5f) / 64;
+    for (const float side : {1.0f, -1.0f}) {
+      const EmitterSample sample = light.sample_towards({0.1f, 0.2f, side}, {x, 0.3f}, x);
+      EXPECT_EQ(sample.radiance, Spectrum(1, 2, 3));
+      EXPECT_LT(dot(sample.n, sample.wi), 0);
+      EXPECT_EQ(light.surface_radiance(hit, {0, 0, side}), Spectrum(1, 2, 3));
+    }
+    const EmissionSample emission = light.sample_emission({0.4f, 0.6f}, {x, 0.7f}, 0.3f);
+    n_behind += emission.ray.d.z < 0;
+    EXPECT_FLOAT_EQ(light.pdf_emission(hit, emission.ray.d).direction, emission.pdf_direction);
+    EXPECT_FLOAT_EQ(emission.pdf_direction, std::abs(emission.ray.d.z) / kTwoPi);
+  }
+  EXPECT_EQ(n_behind, 32);
+  EXPECT_FLOAT_EQ(light.power().g, 2 * (2 * kPi * 4));
+}
+
+TEST(AreaLight, MayHaveAPower) {
+  const auto shape = rectangle(Transform());
+  for (const bool per_triangle : {false, true}) {
+    AreaLight light({constant(Spectrum(0.5f)), true, 10, per_triangle});
+    light.attach(shape.get());
+    EXPECT_FLOAT_EQ(light.power().g, per_triangle ? 10 : 5);  // of two triangles
+  }
+}
+
 }  // namespace
 }  // namespace covary

@@ -6,6 +6,8 @@
 // |--------------|-----------|----------|--------------------------------------------------------------------------|
 // | irradiance   | texture   | 1        | the picture                                                              |
 // | scale        | float     | 1        | factor                                                                   |
+// | constant_intensity | boolean | false | our own: the texture is the power per unit solid angle, as in pbrt        |
+// | power        | float     | none     | our own: luminance of the emitted power, by a factor                     |
 // | fov, fov_axis, focal_length |  | 50mm | as of the sensor `perspective`; the picture's pixels give the aspect      |
 // | to_world     | transform | identity | shines along the image of +z, the picture's y axis up, x to the left      |
 #include "emitters/point_source.h"
@@ -20,10 +22,13 @@ class Projector final : public Emitter {
   explicit Projector(Parameters& p)
       : frame_(get_point_frame(p)),
         irradiance_(p.get_texture("irradiance", Spectrum(1), SpectrumRole::kEmission)),
-        scale_(p.get_float("scale", 1, 0)) {
+        scale_(p.get_float("scale", 1, 0)),
+        constant_intensity_(p.get_bool("constant_intensity", false)) {
     const FieldOfView view = get_field_of_view(p);
     const float aspect = irradiance_->aspect();
     tan_x_ = half_extent_x(view.degrees, view.axis, aspect), tan_y_ = tan_x_ / aspect;
+    const float wanted = p.get_float("power", 0, 0), given = luminance(power());
+    if (wanted > 0 && given > 0) scale_ *= wanted / given;
   }
 
   bool is_delta_position() const override { return true; }
@@ -48,19 +53,17 @@ class Projector final : public Emitter {
     return {1, find(local, uv) ? irradiance_->pdf_position(uv) * per_solid_angle(local.z) : 0};
   }
 
-  /// The intensity is pi E / cos^3; its integral over directions is pi times that of E over the image at distance 1.
+  /// The integral over directions becomes one over the image at distance 1: of pi E, or of I cos^3.
   Spectrum power() const override {
-    const float area = kPi * scale_ * 4 * tan_x_ * tan_y_;
+    const float area = 4 * tan_x_ * tan_y_;
     SurfaceHit hit;
-    if (irradiance_->is_constant()) return irradiance_->eval(hit) * area;
-    return mean_over_texture(*irradiance_,
-                             [&](const Vec2& uv, float pdf) {
-                               hit.uv = uv;
-                               return irradiance_->eval(hit) / Spectrum(pdf);
-                             }) *
-           area;
+    if (irradiance_->is_constant() && !constant_intensity_) return irradiance_->eval(hit) * (area * kPi * scale_);
+    return mean_over_texture(*irradiance_, [&](const Vec2& uv, float pdf) {
+      const float cosine = direction(uv).z;
+      return intensity_at(uv, cosine) * (area * cosine * cosine * cosine / pdf);
+    });
   }
-  bool knows_power() const override { return irradiance_->is_constant(); }
+  bool knows_power() const override { return irradiance_->is_constant() && !constant_intensity_; }
 
  private:
   Vec3 direction(Vec2 uv) const { return normalize(Vec3{(1 - 2 * uv.x) * tan_x_, (1 - 2 * uv.y) * tan_y_, 1}); }
@@ -76,7 +79,7 @@ class Projector final : public Emitter {
   Spectrum intensity_at(Vec2 uv, float cosine) const {
     SurfaceHit hit;
     hit.uv = uv;
-    return irradiance_->eval(hit) * (kPi * scale_ / (cosine * cosine * cosine));
+    return irradiance_->eval(hit) * (constant_intensity_ ? scale_ : kPi * scale_ / (cosine * cosine * cosine));
   }
   Spectrum intensity(const Vec3& local) const {
     Vec2 uv;
@@ -85,7 +88,9 @@ class Projector final : public Emitter {
 
   PointFrame frame_;
   TexturePtr irradiance_;
-  float scale_, tan_x_, tan_y_;  // tan: half extents of the image at distance 1
+  float scale_;
+  bool constant_intensity_;
+  float tan_x_, tan_y_;  // tan: half extents of the image at distance 1
 };
 
 }  // namespace

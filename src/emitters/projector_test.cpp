@@ -29,6 +29,16 @@ TEST(Projector, LightsAPlaneEvenly) {
   EXPECT_NEAR(made.object->power().b, kPi * 2 * 3 * 4, 1e-3f);
 }
 
+/// pbrt's: the same intensity in all directions of the image; the solid angle of a square of 90 degrees is 2 pi / 3.
+TEST(Projector, MayHaveConstantIntensity) {
+  const auto made = make({{"fov", 90.0}, {"scale", 2.0}, {"constant_intensity", true}});
+  ASSERT_EQ(made.errors, "");
+  for (const Vec2 at : {Vec2{0, 0}, Vec2{1.5f, -0.5f}})
+    EXPECT_NEAR(made.object->sample_towards({at.x, at.y, 2}, {}, 0).radiance.g * (dot(at, at) + 4), 2 * 2, 1e-4f);
+  EXPECT_NEAR(made.object->power().g, 2 * 2 * kTwoPi / 3, 1e-3f);
+  EXPECT_NEAR(luminance(make({{"fov", 90.0}, {"constant_intensity", true}, {"power", 7.0}}).object->power()), 7, 1e-4f);
+}
+
 TEST(Projector, EmissionHasItsDensity) {
   const auto made = make({{"fov", 60.0}});
   ASSERT_EQ(made.errors, "");
