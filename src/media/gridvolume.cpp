@@ -7,7 +7,7 @@
 // | to_world      | transform | identity  | moves the unit cube, over which the grid lies                        |
 // | use_grid_bbox | boolean   | false     | the grid lies over the box that the file names                       |
 // | filter_type   | string    | trilinear | or nearest                                                           |
-// | wrap_mode     | string    | clamp     | or repeat, mirror: of what lies outside                              |
+// | wrap_mode     | string    | clamp     | or repeat, mirror, zero (our own): of what lies outside              |
 // | raw, accel    | boolean   |           | accepted, no effect                                                  |
 #include <algorithm>
 #include <cmath>
@@ -15,11 +15,12 @@
 
 #include "media/registry.h"
 #include "media/volume_file.h"
+#include "scene/embedded_data.h"
 
 namespace covary {
 namespace {
 
-enum class Wrap { kClamp, kRepeat, kMirror };
+enum class Wrap { kClamp, kRepeat, kMirror, kZero };
 
 class GridVolume final : public Volume {
  public:
@@ -37,11 +38,15 @@ class GridVolume final : public Volume {
       for (int c = 0; c < 3; ++c)
         largest_[c] = std::max(largest_[c], v[c]), smallest_[c] = std::min(smallest_[c], v[c]);
     }
+    for (int c = 0; wrap_ == Wrap::kZero && c < 3; ++c) smallest_[c] = std::min(smallest_[c], 0.0f);
   }
 
   Spectrum eval(const Vec3& p) const override {
     // Cell i along an axis is centred at (i + 1/2) / size, like texels.
     const Vec3 local = to_grid_.point(p);
+    if (wrap_ == Wrap::kZero)
+      for (int axis = 0; axis < 3; ++axis)
+        if (!(local[axis] >= 0 && local[axis] <= 1)) return {};
     int low[3], high[3];
     float t[3];
     for (int axis = 0; axis < 3; ++axis) {
@@ -53,7 +58,10 @@ class GridVolume final : public Volume {
       high[axis] = nearest_ ? low[axis] : wrapped(static_cast<int64_t>(floor) + 1, n);
     }
     if (nearest_) return value(cell(low[0], low[1], low[2]));
-    const auto row = [&](int y, int z) { return lerp(t[0], value(cell(low[0], y, z)), value(cell(high[0], y, z))); };
+    const auto at = [&](int x, int y, int z) {
+      return wrap_ == Wrap::kZero && std::min({x, y, z}) < 0 ? Spectrum() : value(cell(x, y, z));
+    };
+    const auto row = [&](int y, int z) { return lerp(t[0], at(low[0], y, z), at(high[0], y, z)); };
     const auto plane = [&](int z) { return lerp(t[1], row(low[1], z), row(high[1], z)); };
     return lerp(t[2], plane(low[2]), plane(high[2]));
   }
@@ -64,7 +72,9 @@ class GridVolume final : public Volume {
  private:
   static constexpr float kFar = 1e6f;  // in unit cubes; keeps indices within the range of int
 
+  /// -1: outside.
   int wrapped(int64_t i, int n) const {
+    if (wrap_ == Wrap::kZero) return i >= 0 && i < n ? static_cast<int>(i) : nearest_ ? (i < 0 ? 0 : n - 1) : -1;
     if (wrap_ == Wrap::kClamp) return static_cast<int>(std::clamp<int64_t>(i, 0, n - 1));
     const int64_t period = wrap_ == Wrap::kMirror ? 2 * int64_t{n} : n;
     const int64_t j = ((i % period) + period) % period;
@@ -95,14 +105,15 @@ Transform over(const Bounds3& box) { return Transform::translate(box.lower) * Tr
 }  // namespace
 
 std::shared_ptr<Volume> make_gridvolume(Parameters& p) {
-  const std::string path = p.require_file("filename");
+  const std::string* data = find_embedded(p);
+  const std::string path = data ? "" : p.require_file("filename");
   Transform to_world = p.get_transform("to_world");
   const bool use_box = p.get_bool("use_grid_bbox", false);
   const bool nearest = p.get_choice("filter_type", "trilinear", {"nearest", "trilinear"}) == "nearest";
-  const std::string wrap = p.get_choice("wrap_mode", "clamp", {"clamp", "mirror", "repeat"});
+  const std::string wrap = p.get_choice("wrap_mode", "clamp", {"clamp", "mirror", "repeat", "zero"});
   for (const char* ignored : {"raw", "accel"}) p.get_bool(ignored, false);
-  if (path.empty()) return nullptr;
-  VolumeFile file = read_volume_file(path);
+  if (path.empty() && !data) return nullptr;
+  VolumeFile file = data ? parse_volume(p.object().where.text(), *data) : read_volume_file(path);
   if (use_box) {
     const Vec3 extent = file.bounds.upper - file.bounds.lower;
     if (!(std::min({extent.x, extent.y, extent.z}) > 0 && std::isfinite(length_squared(extent)))) {
@@ -114,6 +125,7 @@ std::shared_ptr<Volume> make_gridvolume(Parameters& p) {
   return std::make_shared<GridVolume>(std::move(file), to_world, nearest,
                                       wrap == "clamp"    ? Wrap::kClamp
                                       : wrap == "repeat" ? Wrap::kRepeat
+                                      : wrap == "zero"   ? Wrap::kZero
                                                          : Wrap::kMirror);
 }
 

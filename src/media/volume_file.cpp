@@ -54,7 +54,32 @@ VolumeFile parse_header(const std::string& path, const char* header, size_t n_by
   return file;
 }
 
+/// Allocates `values` if the header's sizes fit the number of bytes.
+void allocate(const std::string& path, VolumeFile& file, double n_bytes) {
+  const double n = 1.0 * file.size[0] * file.size[1] * file.size[2] * file.channels;
+  if (n_bytes != kHeaderBytes + 4 * n)
+    throw Error(ErrorCode::kInput,
+                fmt::format("{}: has {} bytes; a grid of {} x {} x {} cells with {} channels has {:.0f}", path, n_bytes,
+                            file.size[0], file.size[1], file.size[2], file.channels, kHeaderBytes + 4 * n));
+  require_memory(path, fmt::format("a grid of {} x {} x {} cells", file.size[0], file.size[1], file.size[2]), 4 * n);
+  file.values.resize(static_cast<size_t>(n));
+}
+
+void check_values(const std::string& path, const VolumeFile& file) {
+  const auto wrong = std::find_if(file.values.begin(), file.values.end(), [](float v) { return !std::isfinite(v); });
+  if (wrong != file.values.end())
+    throw Error(ErrorCode::kInput, fmt::format("{}: value {} is not finite", path, wrong - file.values.begin()));
+}
+
 }  // namespace
+
+VolumeFile parse_volume(const std::string& where, std::string_view bytes) {
+  VolumeFile file = parse_header(where, bytes.data(), bytes.size());
+  allocate(where, file, static_cast<double>(bytes.size()));
+  std::memcpy(file.values.data(), bytes.data() + kHeaderBytes, 4 * file.values.size());
+  check_values(where, file);
+  return file;
+}
 
 VolumeFile read_volume_file(const std::string& path) {
   std::error_code failed;
@@ -64,18 +89,10 @@ VolumeFile read_volume_file(const std::string& path) {
   char header[kHeaderBytes] = {};
   stream.read(header, kHeaderBytes);
   VolumeFile file = parse_header(path, header, static_cast<size_t>(stream.gcount()));
-  const double n = 1.0 * file.size[0] * file.size[1] * file.size[2] * file.channels;
-  if (static_cast<double>(n_bytes) != kHeaderBytes + 4 * n)
-    throw Error(ErrorCode::kInput,
-                fmt::format("{}: has {} bytes; a grid of {} x {} x {} cells with {} channels has {:.0f}", path, n_bytes,
-                            file.size[0], file.size[1], file.size[2], file.channels, kHeaderBytes + 4 * n));
-  require_memory(path, fmt::format("a grid of {} x {} x {} cells", file.size[0], file.size[1], file.size[2]), 4 * n);
-  file.values.resize(static_cast<size_t>(n));
+  allocate(path, file, static_cast<double>(n_bytes));
   stream.read(reinterpret_cast<char*>(file.values.data()), static_cast<std::streamsize>(4 * file.values.size()));
   if (!stream) throw Error(ErrorCode::kIo, path + ": cannot be read");
-  const auto wrong = std::find_if(file.values.begin(), file.values.end(), [](float v) { return !std::isfinite(v); });
-  if (wrong != file.values.end())
-    throw Error(ErrorCode::kInput, fmt::format("{}: value {} is not finite", path, wrong - file.values.begin()));
+  check_values(path, file);
   return file;
 }
 

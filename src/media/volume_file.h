@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/ray.h"
@@ -21,5 +22,8 @@ struct VolumeFile {
 /// Throws Error(kIo) if the file cannot be read; Error(kInput) if it is not such a file, if its length does not match
 /// its header, if it does not fit in memory, or if it holds values that are not finite.
 VolumeFile read_volume_file(const std::string& path);
+
+/// The same from memory; `where` names it in messages.
+VolumeFile parse_volume(const std::string& where, std::string_view bytes);
 
 }  // namespace covary
