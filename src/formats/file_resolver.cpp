@@ -7,15 +7,19 @@
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <zlib.h>
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <exception>
 #include <filesystem>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "core/content_hash.h"
 #include "core/error.h"
+#include "core/memory_limit.h"
 #include "core/parallel.h"
 
 namespace covary {
@@ -88,6 +92,40 @@ std::string FileResolver::content_hash(const std::string& scene_hash) const {
   return hash_text(hash_bytes(digest));
 }
 
+namespace {
+
+/// The content of a gzip file, all its members.
+std::string uncompress(const std::string& path, std::string_view bytes) {
+  const auto fail = [&](const char* reason) {
+    throw Error(ErrorCode::kInput, "cannot read '" + path + "': its compressed content " + reason);
+  };
+  z_stream stream{};
+  if (inflateInit2(&stream, 15 + 16) != Z_OK) fail("cannot be decoded");  // 16: with gzip's header
+  const std::unique_ptr<z_stream, int (*)(z_stream*)> owner(&stream, inflateEnd);
+  std::string result;
+  size_t place = 0;
+  int state = Z_OK;
+  while (state != Z_STREAM_END || place < bytes.size()) {
+    if (state == Z_STREAM_END && inflateReset(&stream) != Z_OK) fail("cannot be decoded");
+    const size_t before = result.size(), room = std::max<size_t>(before, size_t{1} << 20);
+    if (before > 0) require_memory(path, "its uncompressed content", 2.0 * static_cast<double>(before));
+    result.resize(before + room);
+    const size_t n_in = std::min<size_t>(bytes.size() - place, size_t{1} << 30);
+    const size_t n_out = std::min<size_t>(room, size_t{1} << 30);
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data() + place));
+    stream.avail_in = static_cast<uInt>(n_in);
+    stream.next_out = reinterpret_cast<Bytef*>(result.data() + before);
+    stream.avail_out = static_cast<uInt>(n_out);
+    state = inflate(&stream, Z_NO_FLUSH);
+    place += n_in - stream.avail_in;
+    result.resize(before + n_out - stream.avail_out);
+    if (state != Z_OK && state != Z_STREAM_END) fail(place == bytes.size() ? "is cut off" : "is damaged");
+  }
+  return result;
+}
+
+}  // namespace
+
 FileView::FileView(const std::string& path) {
   const auto fail = [&](const std::string& reason) {
     throw Error(ErrorCode::kIo, "cannot read '" + path + "': " + reason);
@@ -107,6 +145,18 @@ FileView::FileView(const std::string& path) {
   }
   close(file);
   if (!problem.empty()) fail(problem);
+  if (!path.ends_with(".gz")) return;
+  const std::string_view raw = text();
+  std::exception_ptr failed;
+  try {
+    uncompressed_ = uncompress(path, raw);
+  } catch (...) {
+    failed = std::current_exception();
+  }
+  if (data_) munmap(data_, size_);
+  data_ = nullptr;
+  if (failed) std::rethrow_exception(failed);
+  is_compressed_ = true;
 }
 
 FileView::~FileView() {

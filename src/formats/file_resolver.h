@@ -35,21 +35,26 @@ class FileResolver {
   std::map<std::string, std::string> files_;
 };
 
-/// The bytes of a file, memory-mapped for reading.
+/// The bytes of a file, memory-mapped for reading; those of a file named *.gz are uncompressed.
 class FileView {
  public:
-  /// Throws Error(kIo) if the file cannot be opened or is not a regular file.
+  /// Throws Error(kIo) if the file cannot be opened or is not a regular file; Error(kInput) if it is compressed and
+  /// damaged, or too large.
   explicit FileView(const std::string& path);
   ~FileView();
   FileView(const FileView&) = delete;
   FileView& operator=(const FileView&) = delete;
 
-  std::span<const std::byte> bytes() const { return {static_cast<const std::byte*>(data_), size_}; }
-  std::string_view text() const { return {static_cast<const char*>(data_), size_}; }
+  std::span<const std::byte> bytes() const { return std::as_bytes(std::span(text())); }
+  std::string_view text() const {
+    return is_compressed_ ? std::string_view(uncompressed_) : std::string_view{static_cast<const char*>(data_), size_};
+  }
 
  private:
   void* data_ = nullptr;
   size_t size_ = 0;
+  bool is_compressed_ = false;
+  std::string uncompressed_;
 };
 
 }  // namespace covary

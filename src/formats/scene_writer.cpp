@@ -183,6 +183,7 @@ class Writer {
   std::string add_file(const std::string& bytes) {
     std::string_view content = bytes;
     const char* extension = bytes.starts_with("ply")                             ? ".ply"
+                            : bytes.starts_with("VOL")                           ? ".vol"
                             : bytes.starts_with("PF") || bytes.starts_with("Pf") ? ".pfm"
                             : bytes.starts_with("P5") || bytes.starts_with("P6") ? ".ppm"
                                                                                  : ".txt";

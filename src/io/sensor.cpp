@@ -101,7 +101,8 @@ std::shared_ptr<SensorSettings> make_sensor(Parameters& p) {
     if (!p.has("aperture_radius")) p.error("the float 'aperture_radius' is missing");
     camera.aperture_radius = p.get_float("aperture_radius", 0, 0, kHuge);
     if (!(camera.focus_distance > 0)) p.error_at("focus_distance", "is 0; it must be positive");
-  } else if (!camera.orthographic) {
+  }
+  if (!camera.orthographic) {
     camera.principal_point_offset = {p.get_float("principal_point_offset_x", 0),
                                      p.get_float("principal_point_offset_y", 0)};
   }
