@@ -37,10 +37,16 @@ std::string relative_name(const fs::path& file, const fs::path& folder) {
 
 /// A parameter that Mitsuba's plugin of the same name lacks; empty if there is none.
 std::string own_parameter(const ObjectDescription& object) {
-  for (const auto& [type, name] : {std::pair("spot", "falloff"), std::pair("hdrfilm", "response")})
-    if (object.type == type && std::any_of(object.properties.begin(), object.properties.end(),
-                                           [&, n = name](const Property& p) { return p.name == n; }))
-      return name;
+  static constexpr std::pair<const char*, const char*> kOwn[] = {
+      {"spot", "falloff"},        {"hdrfilm", "response"}, {"bitmap", "gamma"},   {"checkerboard", "dimension"},
+      {"area", "two_sided"},      {"area", "power"},       {"scale", "exponent"}, {"projector", "constant_intensity"},
+      {"roughplastic", "alpha_u"}};
+  const auto has = [&](const std::string& name) {
+    return std::any_of(object.properties.begin(), object.properties.end(),
+                       [&](const Property& p) { return p.name == name; });
+  };
+  for (const auto& [type, name] : kOwn)
+    if (object.type == type && has(name)) return name;
   return "";
 }
 
@@ -51,9 +57,11 @@ void warn_of_own_plugins(const ObjectDescription& scene, std::vector<std::string
     const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
     if (!child || !*child) return;
     const ObjectDescription& object = **child;
-    const bool own = (object.kind == "texture" && object.type == "scale") ||
-                     (object.kind == "integrator" && object.type == "bdpt") ||
-                     (object.kind == "bsdf" && object.type == "metallicroughness");
+    static const std::set<std::pair<std::string, std::string>> kOwn = {
+        {"texture", "bilerp"},         {"texture", "dots"},       {"texture", "mix"},     {"texture", "noise"},
+        {"texture", "scale"},          {"texture", "projected"},  {"integrator", "bdpt"}, {"bsdf", "difftrans"},
+        {"bsdf", "metallicroughness"}, {"emitter", "goniometric"}};
+    const bool own = kOwn.contains({object.kind, object.type});
     if (const std::string name = own_parameter(object); !name.empty() && told.insert(name).second)
       warnings.push_back(fmt::format("{}: the {} '{}' gets the parameter '{}', which Mitsuba 3 does not have",
                                      object.where.text(), object.kind, object.type, name));

@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
-#include "formats/pbrt_reader.h"
 #include "gltf/gltf_reader.h"
+#include "pbrt/pbrt_reader.h"
 
 namespace covary {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "formats/pbrt_parameters.h"
+#include "pbrt/pbrt_parameters.h"
 
 #include <fmt/format.h>
 
@@ -11,107 +11,33 @@
 namespace covary {
 namespace {
 
-const std::vector<std::string> kTypes = {"integer", "float",  "point2",  "vector2",  "point3",   "vector3",
-                                         "normal3", "point",  "vector",  "normal",   "spectrum", "rgb",
-                                         "bool",    "string", "texture", "blackbody"};
+const std::vector<std::string> kTypes = {"integer", "float",  "point2",  "vector2",   "point3",   "vector3",
+                                         "normal3", "point",  "vector",  "normal",    "spectrum", "rgb",
+                                         "bool",    "string", "texture", "blackbody", "color",    "xyz"};
 
 bool is_one_of(const std::string& text, std::initializer_list<const char*> names) {
   return std::ranges::any_of(names, [&](const char* name) { return text == name; });
 }
 
+/// Names of older versions.
+std::string current_type(const std::string& type) {
+  if (type == "point" || type == "vector" || type == "normal") return type + "3";
+  return type == "color" ? "rgb" : type;
+}
+
+/// XYZ to linear Rec. 709 (IEC 61966-2-1).
+void xyz_to_rgb(std::vector<double>& n) {
+  if (n.size() != 3) return;
+  const double x = n[0], y = n[1], z = n[2];
+  n = {3.240479 * x - 1.537150 * y - 0.498535 * z, -0.969256 * x + 1.875991 * y + 0.041556 * z,
+       0.055648 * x - 0.204043 * y + 1.057311 * z};
+}
+
 }  // namespace
 
-char PbrtTokens::take() {
-  const char c = text_[place_++];
-  if (c == '\n')
-    ++line_, column_ = 1;
-  else
-    ++column_;
-  return c;
-}
-
-void PbrtTokens::stop(const PbrtToken& token, const std::string& message) const {
-  diagnostics_.error(where(token), message);
-  throw PbrtStop();
-}
-
-PbrtToken PbrtTokens::peek() {
-  if (!peeked_) next_ = next();
-  peeked_ = true;
-  return next_;
-}
-
-PbrtToken PbrtTokens::next() {
-  if (peeked_) {
-    peeked_ = false;
-    return std::move(next_);
-  }
-  constexpr std::string_view kBlanks = " \t\r\n", kEnds = " \t\r\n\"[]#";
-  while (place_ < text_.size() && (kBlanks.find(text_[place_]) != kBlanks.npos || text_[place_] == '#'))
-    if (take() == '#')
-      while (place_ < text_.size() && text_[place_] != '\n') take();
-  PbrtToken token;
-  token.line = line_, token.column = column_;
-  if (place_ == text_.size()) return token;
-  const char first = take();
-  if (first == '[' || first == ']') {
-    token.kind = first == '[' ? PbrtToken::kOpen : PbrtToken::kClose;
-    token.text = first;
-  } else if (first == '"') {
-    token.kind = PbrtToken::kString;
-    for (;;) {
-      if (place_ == text_.size() || text_[place_] == '\n') stop(token, "unterminated string");
-      char c = take();
-      if (c == '"') break;
-      if (c == '\\' && place_ < text_.size()) {
-        c = take();
-        c = c == 'n' ? '\n' : c == 't' ? '\t' : c;
-      }
-      token.text += c;
-    }
-  } else {
-    token.kind = PbrtToken::kWord;
-    const size_t begin = place_ - 1;
-    while (place_ < text_.size() && kEnds.find(text_[place_]) == kEnds.npos) take();
-    token.text = text_.substr(begin, place_ - begin);
-  }
-  return token;
-}
-
-std::string PbrtTokens::string(const char* what) {
-  PbrtToken token = next();
-  if (token.kind != PbrtToken::kString) stop(token, fmt::format("found '{}'; expected {} in quotes", token.text, what));
-  return std::move(token.text);
-}
-
-double PbrtTokens::number() {
-  const PbrtToken token = next();
-  if (token.kind != PbrtToken::kWord)
-    stop(token, fmt::format("found {}; expected a number",
-                            token.kind == PbrtToken::kEnd ? "the end of the file" : "'" + token.text + "'"));
-  std::string_view text = token.text;
-  if (text.size() > 1 && text[0] == '+') text.remove_prefix(1);
-  try {
-    return parse_number(text);
-  } catch (const Error&) {
-    stop(token, fmt::format("found '{}'; expected a number", token.text));
-  }
-}
-
-std::vector<double> PbrtTokens::numbers(size_t count) {
-  const bool brackets = peek().kind == PbrtToken::kOpen;
-  if (brackets) next();
-  std::vector<double> result;
-  for (size_t i = 0; i < count; ++i) result.push_back(number());
-  if (!brackets) return result;
-  if (const PbrtToken token = next(); token.kind != PbrtToken::kClose)
-    stop(token, fmt::format("found '{}'; expected ']' after {} numbers", token.text, count));
-  return result;
-}
-
 PbrtParameters::PbrtParameters(PbrtTokens& tokens, std::string what, const SourceLocation& where,
-                               Diagnostics& diagnostics)
-    : what_(std::move(what)), where_(where), diagnostics_(diagnostics) {
+                               PbrtMessages& messages, const PbrtContext& context)
+    : what_(std::move(what)), where_(where), messages_(&messages), context_(context) {
   while (tokens.peek().kind == PbrtToken::kString) {
     const PbrtToken token = tokens.next();
     PbrtParameter parameter;
@@ -124,15 +50,22 @@ PbrtParameters::PbrtParameters(PbrtTokens& tokens, std::string what, const Sourc
     parameter.type = token.text.substr(type, type_end - type);
     parameter.name = token.text.substr(name, token.text.find_last_not_of(" \t") + 1 - name);
     if (std::ranges::find(kTypes, parameter.type) == kTypes.end())
-      tokens.stop(token, fmt::format("unknown type '{}' of parameter '{}'{}{}", parameter.type, parameter.name,
-                                     did_you_mean(parameter.type, kTypes),
-                                     parameter.type == "color" || parameter.type == "xyz"
-                                         ? "; files of pbrt-v3 are brought to version 4 by 'pbrt --upgrade'"
-                                         : ""));
+      tokens.stop(token, fmt::format("unknown type '{}' of parameter '{}'{}", parameter.type, parameter.name,
+                                     did_you_mean(parameter.type, kTypes)));
     read_values(tokens, parameter);
+    if (parameter.type == "xyz") xyz_to_rgb(parameter.numbers), parameter.type = "rgb";
+    parameter.type = current_type(parameter.type);
     if (has(parameter.name))
-      diagnostics_.error(parameter.where, fmt::format("parameter '{}' of {} is given twice", parameter.name, what_));
-    parameters_.push_back(std::move(parameter));
+      messages.warn(parameter.where,
+                    fmt::format("parameter '{}' of {} is given twice; the first counts", parameter.name, what_));
+    else
+      parameters_.push_back(std::move(parameter));
+  }
+  if (!context.defaults) return;
+  for (const PbrtParameter& parameter : *context.defaults) {
+    if (has(parameter.name)) continue;
+    parameters_.push_back(parameter);
+    parameters_.back().used = true;  // the directive may have no use for it
   }
 }
 
@@ -160,6 +93,31 @@ void PbrtParameters::read_values(PbrtTokens& tokens, PbrtParameter& parameter) {
 
 bool PbrtParameters::has(const std::string& name) const {
   return std::ranges::any_of(parameters_, [&](const PbrtParameter& p) { return p.name == name; });
+}
+
+bool PbrtParameters::has_texture(const std::string& name) const {
+  return std::ranges::any_of(parameters_,
+                             [&](const PbrtParameter& p) { return p.name == name && p.type == "texture"; });
+}
+
+void PbrtParameters::rename(const std::string& from, const std::string& to) {
+  if (has(to)) return;
+  for (PbrtParameter& parameter : parameters_)
+    if (parameter.name == from) parameter.name = to;
+}
+
+void PbrtParameters::remove(const std::string& name) {
+  std::erase_if(parameters_, [&](const PbrtParameter& p) { return p.name == name; });
+}
+
+void PbrtParameters::set(const std::string& type, const std::string& name, std::vector<double> numbers) {
+  remove(name);
+  parameters_.push_back({type, name, where_, std::move(numbers), {}});
+}
+
+void PbrtParameters::set(const std::string& name, std::vector<std::string> strings) {
+  remove(name);
+  parameters_.push_back({"string", name, where_, {}, std::move(strings)});
 }
 
 const PbrtParameter* PbrtParameters::find(const std::string& name) {
@@ -211,36 +169,55 @@ std::string PbrtParameters::get_string(const std::string& name, const std::strin
 }
 
 Vec3 PbrtParameters::get_vec3(const std::string& name, const Vec3& fallback) {
-  const PbrtParameter* p = find(name, {"point3", "vector3", "normal3", "point", "vector", "normal"}, 3);
+  const PbrtParameter* p = find(name, {"point3", "vector3", "normal3"}, 3);
   if (!p) return fallback;
   return {static_cast<float>(p->numbers[0]), static_cast<float>(p->numbers[1]), static_cast<float>(p->numbers[2])};
 }
 
 std::vector<double> PbrtParameters::get_array(const std::string& name, const std::string& type, size_t width) {
-  std::string older = type;
-  if (type.back() == '3') older.pop_back();  // "point" for "point3"
-  const PbrtParameter* p = find(name, {type.c_str(), older.c_str()}, 0);
+  // Pairs, such as texture coordinates, are also given as plain numbers, and points as vectors.
+  const bool pair = type == "point2", triple = type.ends_with('3');
+  const PbrtParameter* p = find(name,
+                                {type.c_str(),
+                                 pair     ? "vector2"
+                                 : triple ? "vector3"
+                                          : "",
+                                 pair     ? "float"
+                                 : triple ? "point3"
+                                          : ""},
+                                0);
   if (!p) return {};
   if (p->numbers.size() % width == 0 && p->strings.empty()) return p->numbers;
   error_at(*p, fmt::format("has {} numbers; expected a multiple of {}", p->numbers.size(), width));
   return {};
 }
 
-void PbrtParameters::error(const std::string& message) { diagnostics_.error(where_, what_ + " " + message); }
+void PbrtParameters::error(const std::string& message) { messages_->error(where_, what_ + " " + message); }
 void PbrtParameters::error_at(const PbrtParameter& parameter, const std::string& message) {
-  diagnostics_.error(parameter.where, fmt::format("parameter '{}' of {} {}", parameter.name, what_, message));
+  messages_->error(parameter.where, fmt::format("parameter '{}' of {} {}", parameter.name, what_, message));
 }
-void PbrtParameters::warn(const std::string& message) { diagnostics_.warn(where_, what_ + " " + message); }
+void PbrtParameters::warn(const std::string& message) {
+  messages_->warn(where_, (kind_.empty() ? what_ : kind_) + " " + message);
+}
 
 void PbrtParameters::ignore(std::initializer_list<const char*> names) {
   for (const char* name : names) find(name);
 }
 
-void PbrtParameters::report_unknown() {
+void PbrtParameters::ignore_all() {
+  for (PbrtParameter& parameter : parameters_) parameter.used = true;
+}
+
+void PbrtParameters::report_unknown(bool lenient) {
   std::ranges::sort(asked_);
   asked_.erase(std::unique(asked_.begin(), asked_.end()), asked_.end());
-  for (const PbrtParameter& parameter : parameters_)
-    if (!parameter.used) error_at(parameter, "is not supported" + did_you_mean(parameter.name, asked_));
+  for (const PbrtParameter& parameter : parameters_) {
+    if (parameter.used) continue;
+    if (lenient)
+      warn(fmt::format("has the parameter '{}', which is ignored", parameter.name));
+    else
+      error_at(parameter, "is not supported" + did_you_mean(parameter.name, asked_));
+  }
 }
 
 }  // namespace covary

@@ -1,56 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tokens and parameter lists of pbrt-v4 scene files: "float radius" [ 2 ].
+// Parameter lists of pbrt scene files: "float radius" [ 2 ].
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <string>
-#include <string_view>
 #include <vector>
 
-#include "scene/parameters.h"
+#include "core/colour_matrix.h"
+#include "pbrt/pbrt_tokens.h"
 
 namespace covary {
-
-/// Thrown to stop reading at an invalid token; the reason is in the diagnostics.
-struct PbrtStop {};
-
-struct PbrtToken {
-  enum Kind { kEnd, kWord, kString, kOpen, kClose } kind = kEnd;
-  std::string text;  ///< strings without their quotes
-  int line = 0, column = 0;
-};
-
-/// Splits text into tokens; "#" starts a comment.
-class PbrtTokens {
- public:
-  PbrtTokens(std::string_view text, std::string file, Diagnostics& diagnostics)
-      : text_(text), file_(std::move(file)), diagnostics_(diagnostics) {}
-  /// Throws PbrtStop after an error for an unterminated string.
-  PbrtToken next();
-  PbrtToken peek();
-  SourceLocation where(const PbrtToken& token) const { return {file_, token.line, token.column}; }
-  [[noreturn]] void stop(const PbrtToken& token, const std::string& message) const;
-  const std::string& file() const { return file_; }
-  bool at_end() { return peek().kind == PbrtToken::kEnd; }
-
-  /// The next token, which must be a string; `what` says what is expected.
-  std::string string(const char* what);
-  /// The next token, which must be a finite number.
-  double number();
-  /// `count` numbers, with or without brackets.
-  std::vector<double> numbers(size_t count);
-
- private:
-  char take();
-  std::string_view text_;
-  std::string file_;
-  Diagnostics& diagnostics_;
-  size_t place_ = 0;
-  int line_ = 1, column_ = 1;
-  bool peeked_ = false;
-  PbrtToken next_;
-};
 
 struct PbrtParameter {
   std::string type, name;
@@ -60,16 +21,39 @@ struct PbrtParameter {
   bool used = false;
 };
 
+/// What parameters mean depends on the directives before them.
+struct PbrtContext {
+  size_t order = 0;                      ///< of the directive in the scene
+  const ColourMatrix* rec709 = nullptr;  ///< from RGB of the colour space to linear Rec. 709; null: it is that
+  const std::vector<PbrtParameter>* defaults = nullptr;  ///< of the directive Attribute
+};
+
 /// The parameters of one directive. Getters mark them as used; on a wrong type or length they record an error and
 /// return the fallback.
 class PbrtParameters {
  public:
   /// Reads `tokens` up to the next directive. `what` names the object in messages: Shape "sphere".
-  PbrtParameters(PbrtTokens& tokens, std::string what, const SourceLocation& where, Diagnostics& diagnostics);
+  PbrtParameters(PbrtTokens& tokens, std::string what, const SourceLocation& where, PbrtMessages& messages,
+                 const PbrtContext& context = {});
 
   const std::string& what() const { return what_; }
   const SourceLocation& where() const { return where_; }
+  /// Names the object in warnings, so that those of one kind are alike.
+  void set_kind(std::string kind) { kind_ = std::move(kind); }
+  size_t order() const { return context_.order; }
+  PbrtMessages& messages() const { return *messages_; }
+  const std::vector<PbrtParameter>& all() const { return parameters_; }
   bool has(const std::string& name) const;
+  /// Whether it is given as a texture.
+  bool has_texture(const std::string& name) const;
+  /// For names of older versions; nothing if there is no such parameter, or one of the new name.
+  void rename(const std::string& from, const std::string& to);
+  void remove(const std::string& name);
+  /// Adds one, as if the file gave it.
+  void set(const std::string& type, const std::string& name, std::vector<double> numbers);
+  void set(const std::string& name, std::vector<std::string> strings);
+  /// An RGB of the colour space in linear Rec. 709.
+  Spectrum to_rec709(const Spectrum& rgb) const { return context_.rec709 ? *context_.rec709 * rgb : rgb; }
   /// Null if absent; marks it as used.
   const PbrtParameter* find(const std::string& name);
   double get_float(const std::string& name, double fallback);
@@ -87,17 +71,20 @@ class PbrtParameters {
   void warn(const std::string& message);
   /// Marks parameters that have no effect in this renderer as used.
   void ignore(std::initializer_list<const char*> names);
-  /// Records an error for each unused parameter.
-  void report_unknown();
+  /// For objects that are refused as a whole: one message is enough.
+  void ignore_all();
+  /// Records an error for each unused parameter; a warning if `lenient`, for versions whose programs ignore them.
+  void report_unknown(bool lenient = false);
 
  private:
   void read_values(PbrtTokens& tokens, PbrtParameter& parameter);
   /// The parameter, if it has one of these types and `count` values.
   const PbrtParameter* find(const std::string& name, std::initializer_list<const char*> types, size_t count);
 
-  std::string what_;
+  std::string what_, kind_;
   SourceLocation where_;
-  Diagnostics& diagnostics_;
+  PbrtMessages* messages_;
+  PbrtContext context_;
   std::vector<PbrtParameter> parameters_;
   std::vector<std::string> asked_;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "formats/pbrt_placement.h"
+#include "pbrt/pbrt_placement.h"
 
 #include <fmt/format.h>
 
@@ -8,19 +8,22 @@
 namespace covary {
 
 bool change_placement(const std::string& word, PbrtTokens& tokens, const SourceLocation& where,
-                      PbrtPlacement& placement, PbrtSystems& systems, Diagnostics& diagnostics) {
+                      PbrtPlacement& placement, PbrtSystems& systems, PbrtMessages& messages) {
   const auto vec3 = [](const std::vector<double>& n, size_t i) {
     return Vec3{static_cast<float>(n[i]), static_cast<float>(n[i + 1]), static_cast<float>(n[i + 2])};
   };
   const auto apply = [&](const std::function<Transform()>& make, bool replace = false) {
+    if (placement.at_start != placement.at_end)
+      messages.warn(where, "the scene moves: it is shown as it is at the start, without motion blur");
+    if (!placement.at_start) return;
     try {
       placement.to_world = replace ? make() : placement.to_world * make();
     } catch (const Error& error) {
-      diagnostics.error(where, fmt::format("{}: {}", word, error.what()));
+      messages.error(where, fmt::format("{}: {}", word, error.what()));
     }
   };
   if (word == "Identity") {
-    placement.to_world = Transform();
+    apply([] { return Transform(); }, true);
   } else if (word == "Translate") {
     apply([n = tokens.numbers(3), &vec3] { return Transform::translate(vec3(n, 0)); });
   } else if (word == "Scale") {
@@ -47,14 +50,16 @@ bool change_placement(const std::string& word, PbrtTokens& tokens, const SourceL
   } else if (word == "CoordSysTransform") {
     const auto found = systems.find(tokens.string("the name of a coordinate system"));
     if (found == systems.end())
-      diagnostics.error(where, "no coordinate system has this name");
+      messages.error(where, "no coordinate system has this name");
     else
-      placement.to_world = found->second;
-  } else if (word == "ActiveTransform" || word == "TransformTimes") {
-    diagnostics.error(where, fmt::format("'{}' is not supported: nothing moves", word));
-    while (tokens.peek().kind == PbrtToken::kWord &&
-           (word == "TransformTimes" || tokens.peek().text == "All" || tokens.peek().text.ends_with("Time")))
-      if (tokens.next(), word != "TransformTimes") break;
+      apply([&] { return found->second; }, true);
+  } else if (word == "ActiveTransform") {
+    const PbrtToken token = tokens.next();
+    if (token.text != "StartTime" && token.text != "EndTime" && token.text != "All")
+      tokens.stop(token, fmt::format("found '{}'; expected StartTime, EndTime or All", token.text));
+    placement.at_start = token.text != "EndTime", placement.at_end = token.text != "StartTime";
+  } else if (word == "TransformTimes") {
+    tokens.numbers(2);
   } else if (word == "ReverseOrientation") {
     placement.reverse_orientation = !placement.reverse_orientation;
   } else {

@@ -5,7 +5,8 @@
 #include <map>
 #include <string>
 
-#include "formats/pbrt_parameters.h"
+#include "core/transform.h"
+#include "pbrt/pbrt_tokens.h"
 
 namespace covary {
 
@@ -13,12 +14,14 @@ namespace covary {
 struct PbrtPlacement {
   Transform to_world;
   bool reverse_orientation = false;
+  bool at_start = true, at_end = true;  ///< ActiveTransform: for which times transformations apply
 };
 /// CoordinateSystem: transformations by name.
 using PbrtSystems = std::map<std::string, Transform>;
 
-/// Executes the directive `word` with its arguments; false if it is not a transformation.
+/// Executes the directive `word` with its arguments; false if it is not a transformation. What moves stays where it is
+/// at the start, with a warning.
 bool change_placement(const std::string& word, PbrtTokens& tokens, const SourceLocation& where,
-                      PbrtPlacement& placement, PbrtSystems& systems, Diagnostics& diagnostics);
+                      PbrtPlacement& placement, PbrtSystems& systems, PbrtMessages& messages);
 
 }  // namespace covary

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "formats/pbrt_surfaces.h"
+#include "pbrt/pbrt_surfaces.h"
 
 #include <algorithm>
 
@@ -34,7 +34,8 @@ Transform to_pbrt(PbrtUv uv) {
 }
 
 bool has_coordinates(const ObjectDescription& object) {
-  return object.kind == "texture" && (object.type == "bitmap" || object.type == "checkerboard");
+  return object.kind == "texture" &&
+         std::ranges::any_of(object.properties, [](const Property& p) { return p.name == "to_uv"; });
 }
 
 template <typename Is>
@@ -54,20 +55,19 @@ Property* find(ObjectDescription& object, const std::string& name) {
 
 }  // namespace
 
-ObjectPtr PbrtSurfaces::make(const ObjectPtr& material, const Value& alpha, PbrtUv uv, PbrtParameters& shape) {
-  ObjectPtr whole = material ? material : default_material(shape.where());
+ObjectPtr PbrtSurfaces::make(const ObjectPtr& material, const Value& alpha, PbrtUv uv, const SourceLocation& where) {
+  ObjectPtr whole = material ? material : default_material(where);
   if (const auto* number = std::get_if<double>(&alpha); !number || *number < 1) {
-    auto mask = make_object("bsdf", "mask", shape.where(), {{"opacity", alpha}, {"", whole}});
+    auto mask = make_object("bsdf", "mask", where, {{"opacity", alpha}, {"", whole}});
     whole = mask;
   }
-  if (uv == PbrtUv::kOwn) return whole;
   if (uv == PbrtUv::kCurve) {
     if (contains(whole, has_coordinates))
-      shape.warn("has textures, which lie differently around the curve than in pbrt");
+      messages_.warn(where, "textures of curves lie differently around them than in pbrt");
     return whole;
   }
   if (uv == PbrtUv::kDisk && contains(whole, [](const ObjectDescription& o) { return o.type == "normalmap"; }))
-    shape.warn("has a normal map, whose normals are turned by a quarter around the disk's axis");
+    messages_.warn(where, "the normals of a normal map are turned by a quarter around the axis of a disk");
   return fit(whole, uv);
 }
 
@@ -78,6 +78,7 @@ ObjectPtr PbrtSurfaces::default_material(const SourceLocation& where) {
 }
 
 ObjectPtr PbrtSurfaces::fit(const ObjectPtr& object, PbrtUv uv) {
+  if (uv == PbrtUv::kOwn || uv == PbrtUv::kCurve || object->type == "projected") return object;  // not by (u, v)
   if (const auto known = fitted_.find({object, uv}); known != fitted_.end()) return known->second;
   auto copy = std::make_shared<ObjectDescription>(*object);
   bool changed = false;

@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "formats/pbrt_objects.h"
 #include "formats/xml_values.h"
+#include "pbrt/pbrt_objects.h"
 #include "scene/cie_tables.h"
 
 namespace covary {
