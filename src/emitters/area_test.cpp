@@ -382,7 +382,9 @@ TEST(AreaLight, IsMadeFromParameters) {
   hit.ng = {0, 0, 1};
   EXPECT_EQ(light->surface_radiance(hit, {0, 0, 1}), Spectrum(17, 12, 4));
   const auto wrong = make_plugin<Emitter>(emitter_plugins(), "emitter", "area", {{"to_world", Transform()}});
-  EXPECT_EQ(wrong.errors, "test.xml:2:1: unknown parameter 'to_world' of emitter 'area'; known: 'radiance'");
+  EXPECT_EQ(wrong.errors,
+            "test.xml:2:1: unknown parameter 'to_world' of emitter 'area'; known: 'per_triangle', 'power', "
+            "'radiance', 'two_sided'");
 }
 
 /// Both sides shine alike; light paths start on either, with the densities that pdf_emission() states.
@@ -390,6 +392,7 @@ TEST(AreaLight, MayShineOnBothSides) {
   const auto shape = rectangle(Transform());
   AreaLight light({constant(), true});
   light.attach(shape.get());
+  shape->prepare_sampling();
   SurfaceHit hit;
   hit.ng = {0, 0, 1}, hit.frame = Frame({0, 0, 1});
   int n_behind = 0;
@@ -415,6 +418,7 @@ TEST(AreaLight, MayHaveAPower) {
   for (const bool per_triangle : {false, true}) {
     AreaLight light({constant(Spectrum(0.5f)), true, 10, per_triangle});
     light.attach(shape.get());
+    shape->prepare_sampling();
     EXPECT_FLOAT_EQ(light.power().g, per_triangle ? 10 : 5);  // of two triangles
   }
 }

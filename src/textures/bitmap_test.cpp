@@ -232,7 +232,7 @@ TEST(Bitmap, ReportsWrongParameters) {
       << made.errors;
   EXPECT_NE(made.errors.find(
                 "test.xml:3:1: parameter 'wrap_mode' of texture 'bitmap' is 'repeated'; expected one of 'repeat', "
-                "'mirror', 'clamp'; did you mean 'repeat'?"),
+                "'mirror', 'clamp', 'black'; did you mean 'repeat'?"),
             std::string::npos)
       << made.errors;
   EXPECT_NE(made.errors.find("test.xml:4:1: unknown parameter 'filter' of texture 'bitmap'"), std::string::npos)
