@@ -357,6 +357,23 @@ Shape "sphere"
   EXPECT_TRUE(contains(warnings(scene), "the scene moves: it is shown as it is at the start"));
 }
 
+TEST_F(PbrtFeatures, WhatIsFlattenedIsLeftOut) {
+  const LoadedScene scene = world(R"(
+Shape "sphere"
+AttributeBegin
+ConcatTransform [ 0 0 0 0  0 1 0 0  0 0 1 0  0 0 9 1 ]
+Shape "sphere" LightSource "point"
+Identity
+Translate 0 0 3
+Shape "sphere"
+AttributeEnd
+)");
+  EXPECT_EQ(scene.scene->n_shapes(), 2u);
+  EXPECT_EQ(scene.scene->emitters().size(), 0u);
+  EXPECT_NEAR(height(scene, 0, 0), 4, 1e-5f);
+  EXPECT_TRUE(contains(warnings(scene), "matrix is singular; what it places is left out"));
+}
+
 TEST_F(PbrtFeatures, CompressedFilesAreRead) {
   const auto compress = [&](const std::string& name, const std::string& text) {
     gzFile file = gzopen(folder_.file(name).c_str(), "wb");

@@ -343,7 +343,7 @@ ObjectInstance "tree"
 Texture "t" "spectrum" "ptex"
 Material "diffuse" "texture reflectance" "t"
 Shape "plymesh" "string filename" "no.ply"
-Translate 0 0 0 Scale 0 1 1
+Translate 0 0 0
 MakeNamedMedium "smoke" "string type" "vapour"
 MediumInterface "smoke" ""
 Shape "disk"
@@ -366,7 +366,6 @@ LightSource "projection"
            "scene.pbrt:13:1: no object before this one has the name 'tree'",
            "scene.pbrt:14:1: Texture \"spectrum\" \"ptex\" is not supported; supported: textures 'bilerp'",
            "no.ply",
-           "scene.pbrt:17:17: Scale: ",
            "scene.pbrt:18:1: MakeNamedMedium \"smoke\" is of the type 'vapour'; supported: 'cloud'",
            "scene.pbrt:21:1: no medium has the name 'mist'",
            "scene.pbrt:23:1: LightSource \"projection\" has no 'filename'",

@@ -95,6 +95,11 @@ Material "mix" "string namedmaterial1" "a" "string namedmaterial2" "b" "rgb amou
   EXPECT_NEAR(mirror, 1 / (4 * kPi * 0.46168f * 0.46168f), 0.01f);
 }
 
+/// api.cpp: pbrtNamedMaterial reports the name and goes on.
+TEST_F(Pbrt3, UnknownMaterialsAreDefaults) {
+  EXPECT_NEAR(brdf("NamedMaterial \"nothing\"", {0.8f, 0, 0.6f}).g, 0.5f / kPi, 1e-5f);
+}
+
 TEST_F(Pbrt3, EveryMaterialIsRead) {
   for (const char* type : {"disney", "fourier", "glass", "hair", "kdsubsurface", "matte", "metal", "mirror", "none",
                            "plastic", "substrate", "subsurface", "translucent", "uber"}) {

@@ -15,6 +15,7 @@ struct PbrtPlacement {
   Transform to_world;
   bool reverse_orientation = false;
   bool at_start = true, at_end = true;  ///< ActiveTransform: for which times transformations apply
+  bool flat = false;                    ///< a singular transformation flattens what is placed, which is left out
 };
 /// CoordinateSystem: transformations by name.
 using PbrtSystems = std::map<std::string, Transform>;

@@ -182,7 +182,8 @@ class Reader {
         pop(true);
       in_object_ = false;
     } else if (word == "ObjectInstance") {
-      world_->place_instance(tokens.string("the name of an object"), state_.placement.to_world, where_);
+      const std::string name = tokens.string("the name of an object");
+      if (!state_.placement.flat) world_->place_instance(name, state_.placement.to_world, where_);
     } else {
       return false;
     }
@@ -203,6 +204,7 @@ class Reader {
     if (in_world_) {
       p.error("stands behind WorldBegin");
     } else if (word == "Camera") {
+      if (state_.placement.flat) p.error("has a singular transformation");
       read_pbrt_camera(type, p, state_.placement.to_world, view_);
       world_->camera_medium(view_.sensor, state_.outside);
       systems_["camera"] = state_.placement.to_world.inverse();
@@ -261,6 +263,8 @@ class Reader {
       names_.define(PbrtKind::kMaterial, type, kind, std::move(p), state_.placement.to_world);
     } else if (word == "AreaLightSource") {
       state_.area_light = std::make_shared<PbrtAreaLight>(PbrtAreaLight{type, std::move(p)});
+    } else if (state_.placement.flat) {
+      p.ignore_all();
     } else if (word == "LightSource") {
       world_->light(type, std::move(p), state_.placement.to_world);
     } else {

@@ -122,8 +122,12 @@ ObjectPtr PbrtWorld::find(PbrtKind kind, const PbrtUsePtr& use, bool& failed) {
   PbrtDefinitionPtr definition = use->own ? use->own : names_.find(kind, use->name, use->order);
   const char* what = kind == PbrtKind::kMaterial ? "material" : "medium";
   if (!definition) {
-    failed = true;
-    if (reported_.insert(what + use->name).second)  // one message for each name
+    // Version 3 goes on without it.
+    const bool lenient = names_.version_3 && kind == PbrtKind::kMaterial;
+    failed = !lenient;
+    if (lenient)
+      messages_.warn(use->where, fmt::format("no material has the name '{}'; pbrt's default is taken", use->name));
+    else if (reported_.insert(what + use->name).second)  // one message for each name
       messages_.error(use->where, fmt::format("no {} has the name '{}'{}", what, use->name,
                                               did_you_mean(use->name, names_.known(kind))));
     return nullptr;
