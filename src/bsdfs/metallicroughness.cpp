@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // metallicroughness: the material of glTF 2.0, by the formulas of its specification, appendix B.3, and of the
-// extensions KHR_materials_specular, _ior, _transmission, _volume and _clearcoat.
+// extensions KHR_materials_specular, _ior, _transmission, _diffuse_transmission, _volume, _clearcoat, _sheen,
+// _anisotropy and _iridescence.
 //
 // | name                | type           | default | meaning                                                         |
 // |---------------------|----------------|---------|-----------------------------------------------------------------|
@@ -14,13 +15,27 @@
 // | thin                | boolean        | true    | what transmits is a sheet without refraction, not a solid       |
 // | clearcoat           | number/texture | 0       | strength of a second, clear layer of index 1.5                  |
 // | clearcoat_roughness | number/texture | 0       | its roughness                                                   |
+// | sheen_color         | colour/texture | 0       | of light reflected by fibres on top (charlie_sheen.h)           |
+// | sheen_roughness     | number/texture | 0       | its roughness                                                   |
+// | anisotropy          | number         | 0       | blends GGX alpha along the direction of anisotropy with 1       |
+// | anisotropy_rotation | number         | 0       | its direction in radians, counter-clockwise from dp/du          |
+// | anisotropy_map      | texture        |         | red, green: (d + 1) / 2 of a direction; blue: factor            |
+// | iridescence         | number/texture | 0       | blends Schlick's reflectance with a thin film's (iridescence.h) |
+// | iridescence_ior     | number         | 1.3     | index of the film                                               |
+// | iridescence_thickness | number/texture | 400   | its thickness in nanometres                                     |
+// | diffuse_transmission | number/texture | 0      | blends diffuse reflection and diffuse transmission              |
+// | diffuse_transmission_color | colour/texture | 1 | of the latter                                                  |
 //
 // With S(alpha) the GGX reflection with separable masking (as of edition 2.0.1), F the Schlick reflectance at the
 // microfacet, T the transmission through microfacets and m = metallic, t = transmission, c = clearcoat:
 //
 //   dielectric = (1 - max F) ((1 - t) q base / pi + t base T) + F S, F from f0 = min(r0 specular_color, 1) specular
 //   metal      = F' S,                                               F' from f0 = base
-//   material   = (1 - k) ((1 - m) dielectric + m metal) + k S(coat),   k = c (0.04 + 0.96 (1 - |V.n|)^5)
+//   cloth      = sheen + s ((1 - m) dielectric + m metal),            s = 1 - max sheen_color max(E(V.n), E(L.n))
+//   material   = (1 - k) cloth + k S(coat),                           k = c (0.04 + 0.96 (1 - |V.n|)^5)
+//
+// with E the albedo of white sheen. Of the light that would be reflected diffusely, diffuse_transmission goes to the
+// other side instead.
 //
 // The specification demands that energy is conserved, but its sample implementation (q = 1) reflects up to 1.3 times
 // the light for bright colours at grazing angles. Where the albedos E of diffuse and specular light add up to more than
@@ -29,7 +44,12 @@
 // V is the direction of the viewer: neither q nor a coat is reciprocal. If nothing is transmitted, the side opposite
 // the normal is black; a sheet looks alike from both sides; a solid refracts on both.
 //
-// Lobes: 0 diffuse (cosine-weighted), 1 reflection, 2 coat, 3 transmission (visible GGX normals).
+// Lobes: 0 diffuse and sheen (cosine-weighted), 1 reflection, 2 coat, 3 transmission (visible GGX normals), 4 diffuse
+// transmission (cosine-weighted).
+#include "bsdfs/metallicroughness.h"
+
+#include "bsdfs/charlie_sheen.h"
+#include "bsdfs/iridescence.h"
 #include "bsdfs/principled_terms.h"
 #include "bsdfs/registry.h"
 #include "bsdfs/schlick_albedo.h"
@@ -40,25 +60,16 @@ namespace {
 
 constexpr float kCoatR0 = 0.04f;  // index 1.5
 
-struct MetalRoughInputs {
-  ColourInput base_color, specular_color;
-  NumberInput metallic, roughness, specular, transmission, clearcoat, clearcoat_roughness;
-};
-struct MetalRoughPoint {
-  Spectrum base, specular_color;
-  float metallic, roughness, specular, transmission, clearcoat, clearcoat_roughness;
-};
-struct MetalRoughSettings {
-  float ior;
-  bool thin, transmits;
-};
-
-Microfacet ggx(float roughness) { return principled_distribution(roughness, 0); }
+/// KHR_materials_anisotropy: alpha along x is blended with 1.
+Microfacet ggx(float roughness, float anisotropy = 0) {
+  const float alpha = std::max(sqr(roughness), 0.001f);
+  return {MicrofacetType::kGgx, lerp(sqr(anisotropy), alpha, 1.0f), alpha};
+}
 
 class MetalRoughClosure final : public BsdfClosure {
  public:
   MetalRoughClosure(const MetalRoughPoint& p, const MetalRoughSettings& settings, TransportMode mode)
-      : distribution_(ggx(p.roughness)),
+      : distribution_(ggx(p.roughness, p.anisotropy)),
         coat_distribution_(ggx(p.clearcoat_roughness)),
         // A solid whose index is 1 would let light pass as a delta lobe.
         eta_(std::max(settings.ior, 1.001f)),
@@ -66,23 +77,31 @@ class MetalRoughClosure final : public BsdfClosure {
         coat_(p.clearcoat),
         f90_(p.specular),
         metallic_(p.metallic),
-        transmits_(settings.transmits),
-        solid_(transmits_ && !settings.thin),
+        film_(p.iridescence),
+        film_ior_(settings.iridescence_ior),
+        film_thickness_(p.thickness),
+        cos_turn_(p.cos_turn),
+        sin_turn_(p.sin_turn),
+        flags_(settings.flags()),
+        solid_(settings.transmits && !settings.thin),
         radiance_(mode == TransportMode::kRadiance),
-        base_(p.base) {
+        base_(p.base),
+        sheen_(p.sheen),
+        sheen_model_(p.sheen_roughness),
+        sheen_roughness_(p.sheen_roughness) {
     const Spectrum r0 = p.specular_color * schlick_r0(settings.ior);
     f0_ = Spectrum(std::min(r0.r, 1.0f), std::min(r0.g, 1.0f), std::min(r0.b, 1.0f)) * p.specular;
-    diffuse_ = p.base * ((1 - p.metallic) * (1 - p.transmission) * kInvPi);
+    const float scattered = (1 - p.metallic) * (1 - p.transmission) * kInvPi;
+    diffuse_ = p.base * (scattered * (1 - p.through));
+    through_ = p.through_color * (scattered * p.through);
     transmitted_ = p.base * ((1 - p.metallic) * p.transmission);
   }
 
-  uint32_t flags() const override {
-    return kDiffuseReflection | kGlossyReflection | (transmits_ ? uint32_t{kGlossyTransmission} : 0u);
-  }
+  uint32_t flags() const override { return flags_; }
   BsdfValue eval(const Vec3& wo, const Vec3& wi) const override {
     const View view(*this, wo);
     if (!view.active) return {};
-    const Terms t = terms(view, view.front ? wi : -wi);
+    const Terms t = terms(view, local(view, wi));
     return {t.value, t.mixture(view)};
   }
   BsdfSample sample(const Vec3& wo, float u_lobe, Vec2 u) const override {
@@ -91,34 +110,36 @@ class MetalRoughClosure final : public BsdfClosure {
     uint32_t lobe = 0;
     for (; lobe + 1 < kLobes && u_lobe >= view.pmf[lobe]; ++lobe) u_lobe -= view.pmf[lobe];
     const Vec3 i = direction(view, lobe, u);
-    if (!(lobe == kTransmission ? i.z < 0 : i.z > 0)) return {};
+    if (!(lobe >= kTransmission ? i.z < 0 : i.z > 0)) return {};
     const Terms t = terms(view, i);
     const float pdf = t.mixture(view);
     if (!(t.pdf[lobe] > 0 && pdf > 0)) return {};
-    return {.wi = view.front ? i : -i,
+    static constexpr uint32_t kFlags[kLobes] = {kDiffuseReflection, kGlossyReflection, kGlossyReflection,
+                                                kGlossyTransmission, kDiffuseTransmission};
+    const Vec3 wi = turned(i, -sin_turn_);
+    return {.wi = view.front ? wi : -wi,
             .weight = t.value / pdf,
             .pdf = pdf,
             .eta = i.z < 0 && solid_ ? view.eta : 1,
-            .flags = lobe == kDiffuse        ? uint32_t{kDiffuseReflection}
-                     : lobe == kTransmission ? uint32_t{kGlossyTransmission}
-                                             : uint32_t{kGlossyReflection},
+            .flags = kFlags[lobe],
             .lobe = lobe};
   }
   int n_lobes() const override { return kLobes; }
   void lobe_pmfs(const Vec3& wo, float* pmfs) const override { std::copy_n(View(*this, wo).pmf, kLobes, pmfs); }
   void lobe_pdfs(const Vec3& wo, const Vec3& wi, float* pdfs) const override {
     const View view(*this, wo);
-    const Terms t = view.active ? terms(view, view.front ? wi : -wi) : Terms{};
+    const Terms t = view.active ? terms(view, local(view, wi)) : Terms{};
     std::copy_n(t.pdf, kLobes, pdfs);
   }
 
  private:
-  enum Lobe : uint32_t { kDiffuse, kReflection, kCoat, kTransmission, kLobes };
+  enum Lobe : uint32_t { kDiffuse, kReflection, kCoat, kTransmission, kThrough, kLobes };
 
   /// Terms that depend on wo alone. From the back, directions are negated; in a solid, `inside` is true.
   struct View {
-    View(const MetalRoughClosure& closure, const Vec3& wo) : front(wo.z > 0), o(front ? wo : -wo) {
-      active = o.z > 0 && (front || closure.transmits_);
+    View(const MetalRoughClosure& closure, const Vec3& wo) : front(wo.z > 0) {
+      o = closure.turned(front ? wo : -wo, closure.sin_turn_);
+      active = o.z > 0 && (front || (closure.flags_ & kTransmission) != 0);
       inside = !front && closure.solid_;
       eta = inside ? 1 / closure.eta_ : closure.eta_;
       if (active) closure.lobe_probabilities(*this);
@@ -126,11 +147,11 @@ class MetalRoughClosure final : public BsdfClosure {
     bool front, active, inside;
     Vec3 o;
     float eta;  // on the other side over that on the side of wo
-    float pmf[kLobes] = {0, 0, 0, 0};
+    float pmf[kLobes] = {};
   };
   struct Terms {
     Spectrum value;
-    float pdf[kLobes] = {0, 0, 0, 0};
+    float pdf[kLobes] = {};
     float mixture(const View& view) const {
       float sum = 0;
       for (uint32_t l = 0; l < kLobes; ++l) sum += view.pmf[l] * pdf[l];
@@ -138,12 +159,21 @@ class MetalRoughClosure final : public BsdfClosure {
     }
   };
 
+  /// In the frame whose x axis is the direction of anisotropy; back with the opposite sine.
+  Vec3 turned(const Vec3& w, float sine) const {
+    return {cos_turn_ * w.x + sine * w.y, cos_turn_ * w.y - sine * w.x, w.z};
+  }
+  Vec3 local(const View& view, const Vec3& wi) const { return turned(view.front ? wi : -wi, sin_turn_); }
+
   /// Estimates of the lobes' albedos, which must not depend on the transport mode. Diffuse light meets microfacets half
   /// way between o and the normal. What reflects at no angle seen here may do so at others: nothing is 0.
   void lobe_probabilities(View& view) const {
     const float z = view.o.z, half = std::sqrt(0.5f * (1 + z));
     const float coat = view.inside ? 0 : coat_ * std::max(coat_fresnel(z), 0.1f), base = 1 - coat;
-    view.pmf[kDiffuse] = view.inside ? 0 : base * (1 - max_component(dielectric_fresnel(half))) * mean(diffuse_) * kPi;
+    const float passed = view.inside ? 0 : base * std::max(1 - max_component(dielectric_fresnel(half)), 0.05f);
+    view.pmf[kDiffuse] =
+        passed * mean(diffuse_) * kPi + (has_sheen() ? base * mean(sheen_) * charlie_albedo(z, sheen_roughness_) : 0);
+    view.pmf[kThrough] = passed * mean(through_) * kPi;
     view.pmf[kReflection] = base * (mean(fresnel(lerp(0.5f * distribution_.alpha_u(), cosine(view, z), 1))) + 0.02f);
     view.pmf[kCoat] = coat;
     view.pmf[kTransmission] =
@@ -155,6 +185,7 @@ class MetalRoughClosure final : public BsdfClosure {
 
   Vec3 direction(const View& view, uint32_t lobe, Vec2 u) const {
     if (lobe == kDiffuse) return warp::square_to_cosine_hemisphere(u);
+    if (lobe == kThrough) return -warp::square_to_cosine_hemisphere(u);
     const Vec3 m = (lobe == kCoat ? coat_distribution_ : distribution_).sample(view.o, u).m;
     if (lobe == kTransmission && solid_) {
       const DielectricFresnel f = fresnel_dielectric(dot(view.o, m), view.eta);
@@ -167,15 +198,31 @@ class MetalRoughClosure final : public BsdfClosure {
   /// Cosine at a microfacet on its optically thinner side, 0 for total reflection; `c` on the side of wo.
   float cosine(const View& view, float c) const { return view.inside ? safe_sqrt(1 - (1 - c * c) / sqr(view.eta)) : c; }
   static float coat_fresnel(float c) { return kCoatR0 + (1 - kCoatR0) * schlick_weight(c); }
-  Spectrum dielectric_fresnel(float c) const { return lerp(schlick_weight(c), f0_, Spectrum(f90_)); }
+  Spectrum dielectric_fresnel(float c) const {
+    return under_film(lerp(schlick_weight(c), f0_, Spectrum(f90_)), f0_, c);
+  }
   /// Of the mixture of dielectric and metal.
   Spectrum fresnel(float c) const {
-    return lerp(metallic_, dielectric_fresnel(c), lerp(schlick_weight(c), base_, Spectrum(1)));
+    const Spectrum metal = under_film(lerp(schlick_weight(c), base_, Spectrum(1)), base_, c);
+    return lerp(metallic_, dielectric_fresnel(c), metal);
+  }
+  Spectrum under_film(const Spectrum& bare, const Spectrum& f0, float c) const {
+    if (!(film_ > 0)) return bare;
+    const Spectrum film = thin_film_reflectance(f0, film_ior_, film_thickness_, clamp01(c));
+    return lerp(film_, bare, {std::min(film.r, 1.0f), std::min(film.g, 1.0f), std::min(film.b, 1.0f)});
+  }
+  bool has_sheen() const { return max_component(sheen_) > 0; }
+  /// s: what sheen leaves for light between these cosines.
+  float under_sheen(float o, float i) const {
+    if (!has_sheen()) return 1;
+    const float albedo = std::max(charlie_albedo(o, sheen_roughness_), charlie_albedo(i, sheen_roughness_));
+    return std::max(1 - max_component(sheen_) * albedo, 0.0f);
   }
 
   /// q for a viewer under the cosine `mu`.
   float diffuse_limit(float mu) const {
-    const float f0 = max_component(f0_), left = 1 - schlick_specular_albedo(mu, roughness_).reflected(f0, f90_);
+    const float f0 = max_component(f0_);
+    const float left = std::max(1 - schlick_specular_albedo(mu, roughness_).reflected(f0, f90_), 0.0f);
     const float diffuse = max_component(base_) * (1 - schlick_diffuse_albedo(mu).reflected(f0, f90_));
     return left < diffuse ? left / diffuse : 1;
   }
@@ -186,9 +233,11 @@ class MetalRoughClosure final : public BsdfClosure {
     const float k = coat_ > 0 ? coat_ * coat_fresnel(radiance_ ? view.o.z : std::abs(i.z)) : 0;
     if (i.z > 0)
       reflection_terms(view, i, k, t);
-    else if (i.z < 0 && transmits_)
+    else if (i.z < 0 && flags_ & kTransmission) {
       solid_ ? refraction_terms(view, i, t) : sheet_terms(view, i, t);
-    if (i.z < 0) t.value = t.value * (1 - k);
+      through_terms(view, i, t);
+    }
+    if (i.z < 0) t.value = t.value * ((1 - k) * under_sheen(view.o.z, -i.z));
     return t;
   }
   void reflection_terms(const View& view, const Vec3& i, float k, Terms& t) const {
@@ -201,6 +250,7 @@ class MetalRoughClosure final : public BsdfClosure {
             diffuse_ * ((1 - max_component(dielectric_fresnel(c))) * diffuse_limit(radiance_ ? view.o.z : i.z) * i.z);
       t.pdf[kDiffuse] = warp::cosine_hemisphere_pdf_solid_angle(i.z);
     }
+    if (has_sheen()) t.value = t.value * under_sheen(view.o.z, i.z) + sheen_ * sheen_model_.eval(view.o, i, h);
     t.value = t.value * (1 - k);
     if (coat_ > 0 && !view.inside) t.value += Spectrum(k * specular(coat_distribution_, view.o, i, h, t.pdf[kCoat]));
   }
@@ -209,6 +259,12 @@ class MetalRoughClosure final : public BsdfClosure {
     const Vec3 mirrored{i.x, i.y, -i.z}, h = normalize(view.o + mirrored);
     const float s = specular(distribution_, view.o, mirrored, h, t.pdf[kTransmission]);
     t.value = transmitted_ * ((1 - max_component(dielectric_fresnel(dot(view.o, h)))) * s);
+  }
+  void through_terms(const View& view, const Vec3& i, Terms& t) const {
+    if (view.inside) return;
+    const Vec3 h = normalize(view.o + Vec3{i.x, i.y, -i.z});
+    t.value += through_ * ((1 - max_component(dielectric_fresnel(dot(view.o, h)))) * -i.z);
+    t.pdf[kThrough] = warp::cosine_hemisphere_pdf_solid_angle(-i.z);
   }
   void refraction_terms(const View& view, const Vec3& i, Terms& t) const {
     Vec3 h = view.o + i * view.eta;
@@ -229,9 +285,12 @@ class MetalRoughClosure final : public BsdfClosure {
   }
 
   Microfacet distribution_, coat_distribution_;
-  float eta_, roughness_, coat_, f90_, metallic_;
-  bool transmits_, solid_, radiance_;
-  Spectrum base_, f0_, diffuse_, transmitted_;
+  float eta_, roughness_, coat_, f90_, metallic_, film_, film_ior_, film_thickness_, cos_turn_, sin_turn_;
+  uint32_t flags_;
+  bool solid_, radiance_;
+  Spectrum base_, f0_, diffuse_, transmitted_, through_, sheen_;
+  CharlieSheen sheen_model_;
+  float sheen_roughness_;
 };
 
 class MetalRough final : public Bsdf {
@@ -240,39 +299,21 @@ class MetalRough final : public Bsdf {
       : in_(std::move(inputs)),
         settings_(settings),
         // If no parameter is textured, all points share the same closures.
-        constant_(is_constant()),
+        constant_(is_constant(in_)),
         constant_closures_{{constant_point(), settings, TransportMode::kRadiance},
                            {constant_point(), settings, TransportMode::kImportance}} {}
 
-  uint32_t flags() const override {
-    return kDiffuseReflection | kGlossyReflection | (settings_.transmits ? uint32_t{kGlossyTransmission} : 0u);
-  }
+  uint32_t flags() const override { return settings_.flags(); }
+  bool needs_derivatives() const override { return settings_.anisotropy != 0; }
   const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode mode, Arena& arena) const override {
     if (constant_) return &constant_closures_[mode == TransportMode::kRadiance ? 0 : 1];
-    return arena.make<MetalRoughClosure>(point(hit), settings_, mode);
+    return arena.make<MetalRoughClosure>(point_of(in_, settings_, hit), settings_, mode);
   }
   const Texture* main_texture() const override { return in_.base_color.texture(); }
   Spectrum albedo(const SurfaceHit& hit) const override { return clamp01(in_.base_color.eval(hit)); }
 
  private:
-  bool is_constant() const {
-    for (const NumberInput* n :
-         {&in_.metallic, &in_.roughness, &in_.specular, &in_.transmission, &in_.clearcoat, &in_.clearcoat_roughness})
-      if (!n->is_constant()) return false;
-    return in_.base_color.is_constant() && in_.specular_color.is_constant();
-  }
-  MetalRoughPoint point(const SurfaceHit& hit) const {
-    const auto number = [&](const NumberInput& n) { return clamp01(n.eval(hit)); };
-    return {clamp01(in_.base_color.eval(hit)),
-            in_.specular_color.eval(hit),
-            number(in_.metallic),
-            number(in_.roughness),
-            number(in_.specular),
-            number(in_.transmission),
-            number(in_.clearcoat),
-            number(in_.clearcoat_roughness)};
-  }
-  MetalRoughPoint constant_point() const { return constant_ ? point({}) : MetalRoughPoint{}; }
+  MetalRoughPoint constant_point() const { return constant_ ? point_of(in_, settings_, {}) : MetalRoughPoint{}; }
 
   MetalRoughInputs in_;
   MetalRoughSettings settings_;
@@ -286,15 +327,27 @@ std::shared_ptr<Bsdf> make_metallicroughness(Parameters& parameters) {
   const auto fraction = [&](const char* name, float fallback) { return get_fraction(parameters, name, fallback); };
   MetalRoughInputs in{ColourInput(parameters, "base_color", 1),
                       ColourInput(parameters.get_texture("specular_color", Spectrum(1), SpectrumRole::kEmission)),
+                      ColourInput(parameters, "sheen_color", 0),
+                      ColourInput(parameters, "diffuse_transmission_color", 1),
                       fraction("metallic", 1),
                       fraction("roughness", 1),
                       fraction("specular", 1),
                       fraction("transmission", 0),
                       fraction("clearcoat", 0),
-                      fraction("clearcoat_roughness", 0)};
-  const bool transmits = !in.transmission.is_constant() || in.transmission.constant() > 0;
-  const MetalRoughSettings settings{parameters.get_float("ior", 1.5f, 0, 100), parameters.get_bool("thin", true),
-                                    transmits};
+                      fraction("clearcoat_roughness", 0),
+                      fraction("sheen_roughness", 0),
+                      fraction("iridescence", 0),
+                      NumberInput(parameters.get_texture("iridescence_thickness", 400)),
+                      fraction("diffuse_transmission", 0),
+                      parameters.find_texture("anisotropy_map")};
+  const auto some = [](const NumberInput& n) { return !n.is_constant() || n.constant() > 0; };
+  const MetalRoughSettings settings{parameters.get_float("ior", 1.5f, 0, 100),
+                                    parameters.get_float("iridescence_ior", 1.3f, 1, 100),
+                                    parameters.get_float("anisotropy", 0, 0, 1),
+                                    parameters.get_float("anisotropy_rotation", 0),
+                                    parameters.get_bool("thin", true),
+                                    some(in.transmission),
+                                    some(in.through)};
   return std::make_shared<MetalRough>(std::move(in), settings);
 }
 
