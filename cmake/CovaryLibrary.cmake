@@ -16,7 +16,8 @@ target_compile_features(covary_library INTERFACE cxx_std_20)
 target_include_directories(covary_library INTERFACE
   $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 # What has code; static, the programs of others link it, too.
-target_link_libraries(covary_library PRIVATE
+get_property(gltf_libraries GLOBAL PROPERTY COVARY_GLTF_LIBRARIES)
+target_link_libraries(covary_library PRIVATE ${gltf_libraries}
   TBB::tbb embree OpenEXR::OpenEXR PNG::PNG JPEG::JPEG ZLIB::ZLIB pugixml::pugixml TinyGLTF::TinyGLTF fmt::fmt
   ${CMAKE_DL_LIBS}
   "$<BUILD_INTERFACE:${XXHASH_LIBRARY}>$<INSTALL_INTERFACE:xxhash>")
@@ -99,7 +100,8 @@ if(NOT BUILD_SHARED_LIBS)
   list(GET configurations 0 configuration)
   get_target_property(embree_file embree IMPORTED_LOCATION_${configuration})
   string(REGEX REPLACE ".*/lib(embree[0-9]*)\\..*" "-l\\1" embree_link "${embree_file}")
-  set(libraries " ${embree_link} -ldl -Wl,-rpath,\${libdir}/covary")
+  get_property(gltf_links GLOBAL PROPERTY COVARY_GLTF_LINKS)
+  set(libraries " ${embree_link}${gltf_links} -ldl -Wl,-rpath,\${libdir}/covary")
 endif()
 file(RELATIVE_PATH prefix /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
 string(REGEX REPLACE "/$" "" prefix "${prefix}")

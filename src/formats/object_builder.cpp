@@ -42,11 +42,16 @@ std::string ply_text(const EmbeddedMesh& mesh) {
   for (const char* name : {"x", "y", "z"}) text += fmt::format("property float {}\n", name);
   if (!mesh.normals.empty()) text += "property float nx\nproperty float ny\nproperty float nz\n";
   if (!mesh.uvs.empty()) text += "property float u\nproperty float v\n";
+  if (!mesh.colours.empty()) text += "property float r\nproperty float g\nproperty float b\n";
+  if (!mesh.alphas.empty()) text += "property float alpha\n";
   text += fmt::format("element face {}\nproperty list uchar int vertex_indices\nend_header\n", mesh.corners.size() / 3);
   const auto add = [&](const std::vector<double>& values, size_t i, size_t width) {
     for (size_t k = 0; k < width && !values.empty(); ++k) append(text, static_cast<float>(values[i * width + k]));
   };
-  for (size_t i = 0; i < n; ++i) add(mesh.positions, i, 3), add(mesh.normals, i, 3), add(mesh.uvs, i, 2);
+  for (size_t i = 0; i < n; ++i) {
+    add(mesh.positions, i, 3), add(mesh.normals, i, 3), add(mesh.uvs, i, 2);
+    add(mesh.colours, i, 3), add(mesh.alphas, i, 1);
+  }
   for (size_t i = 0; i < mesh.corners.size(); ++i) {
     if (i % 3 == 0) append(text, uint8_t{3});
     append(text, static_cast<int32_t>(mesh.corners[i]));

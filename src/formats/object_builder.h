@@ -40,7 +40,8 @@ void visit_properties(const ObjectDescription& root, const Visit& visit) {
 
 struct EmbeddedMesh {
   std::vector<double> positions, normals, uvs;  ///< three, three and two numbers per vertex; the last two may be empty
-  std::vector<double> corners;                  ///< three indices per triangle, integers in range
+  std::vector<double> colours, alphas;  ///< three and one; may be empty; attributes vertex_color and vertex_alpha
+  std::vector<double> corners;          ///< three indices per triangle, integers in range
 };
 
 /// The mesh as a binary PLY file.

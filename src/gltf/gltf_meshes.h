@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// glTF meshes: triangles, strips and fans as shapes `ply`.
+// glTF meshes: triangles, strips and fans as shapes `ply`, deformed as they are at rest.
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 
+#include "core/transform.h"
 #include "formats/object_builder.h"
 #include "gltf/gltf_file.h"
 
@@ -12,12 +14,19 @@ namespace covary {
 
 struct GltfMesh {
   EmbeddedMesh mesh;
-  bool smooth = false;  ///< has normals
+  bool smooth = false;       ///< has normals
+  bool transparent = false;  ///< a vertex colour has an alpha below 1
+};
+
+/// How a node deforms its mesh.
+struct GltfPose {
+  std::span<const double> weights;    ///< of the morph targets
+  std::span<const Transform> joints;  ///< from the mesh's space to world space; empty: no skin
 };
 
 /// The triangles of a primitive with the texture coordinates of `texture_set`; nullopt after an error, or, with a
 /// warning, if it has no triangles. Messages call it `what`.
 std::optional<GltfMesh> read_gltf_mesh(GltfFile& file, const tinygltf::Primitive& primitive, int texture_set,
-                                       const std::string& what);
+                                       const GltfPose& pose, const std::string& what);
 
 }  // namespace covary

@@ -9,6 +9,9 @@
 
 namespace covary {
 
+/// The id of the emission of materials that are to appear as they are painted.
+inline constexpr const char* kUnlit = "unlit";
+
 /// Reads the file, JSON or binary, with its buffers and images; see read_scene_xml().
 SceneXml read_scene_gltf(std::string_view bytes, const std::string& name, FileResolver& files,
                          Diagnostics& diagnostics);

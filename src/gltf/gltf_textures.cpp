@@ -8,25 +8,46 @@
 
 #include "core/memory_limit.h"
 #include "core/srgb.h"
+#include "core/vec.h"
+#include "gltf/gltf_compression.h"
 #include "scene/embedded_data.h"
 
 namespace covary {
 namespace {
 
-/// Width and height of a PNG or JPEG image, from its header; zeros if it is neither.
-std::pair<int, int> size_of(const std::vector<unsigned char>& bytes) {
-  const auto two = [&](size_t at) { return bytes[at] * 256 + bytes[at + 1]; };
-  if (bytes.size() > 24 && bytes[0] == 0x89 && bytes[1] == 'P') {
+/// Width and height of a PNG, JPEG or WebP image, from its header; zeros if it is none of them.
+std::pair<int, int> size_of(std::string_view bytes) {
+  const auto byte = [&](size_t at) { return static_cast<int>(static_cast<unsigned char>(bytes[at])); };
+  const auto two = [&](size_t at) { return byte(at) * 256 + byte(at + 1); };
+  if (is_webp(bytes)) {
+    const WebpImage header = webp_size(bytes);
+    return {header.width, header.height};
+  }
+  if (bytes.size() > 24 && byte(0) == 0x89 && bytes[1] == 'P') {
     if (two(16) > 0 || two(20) > 0) return {1 << 16, 1 << 16};  // more than is supported
     return {two(18), two(22)};
   }
-  if (bytes.size() < 4 || bytes[0] != 0xff || bytes[1] != 0xd8) return {0, 0};
-  for (size_t at = 2; at + 9 < bytes.size() && bytes[at] == 0xff; at += 2 + static_cast<size_t>(two(at + 2))) {
-    const int marker = bytes[at + 1];
+  if (bytes.size() < 4 || two(0) != 0xffd8) return {0, 0};
+  for (size_t at = 2; at + 9 < bytes.size() && byte(at) == 0xff; at += 2 + static_cast<size_t>(two(at + 2))) {
+    const int marker = byte(at + 1);
     if (marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc)
       return {two(at + 7), two(at + 5)};
   }
   return {0, 0};
+}
+
+/// What an image is that is not read.
+std::string unknown_format(std::string_view bytes) {
+  static constexpr const char* kAdvice = "; convert it to PNG, e.g. with gltf-transform";
+  if (bytes.starts_with("\xabKTX")) return fmt::format("is a KTX texture, which is not supported{}", kAdvice);
+  if (is_webp(bytes) && !reads_webp())
+    return "is a WebP picture, and covary was built without libwebp-dev; build it with the latter, or convert it";
+  return fmt::format("is not a readable PNG, JPEG or WebP picture{}", kAdvice);
+}
+
+std::string lower(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
 }
 
 std::string wrap_mode(int wrap) {
@@ -64,11 +85,9 @@ ObjectPtr GltfTextures::make(int texture, const tinygltf::ExtensionMap& extensio
     file_.error(fmt::format("there is no texture {}", texture));
     return nullptr;
   }
+  const int source = source_of(texture);
+  if (source < 0) return nullptr;
   const tinygltf::Texture& given = model.textures[texture];
-  if (given.source < 0 || static_cast<size_t>(given.source) >= model.images.size()) {
-    file_.error(fmt::format("texture {} has no image in PNG or JPEG, which are supported", texture));
-    return nullptr;
-  }
   auto bitmap = make_object("texture", "bitmap", file_.where());
   try {
     set_property(*bitmap, "to_uv", uv_transform(extensions));
@@ -83,39 +102,57 @@ ObjectPtr GltfTextures::make(int texture, const tinygltf::ExtensionMap& extensio
     if (sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST)
       set_property(*bitmap, "filter_type", std::string("nearest"));
   }
-  const bool as_it_is = use.kind != GltfUse::kChannel && use.factor == Spectrum(1);
+  const bool as_it_is = use.kind == GltfUse::kVector || (use.kind == GltfUse::kColour && use.factor == Spectrum(1));
   set_property(*bitmap, "raw", use.kind != GltfUse::kColour);
-  const tinygltf::Image& image = model.images[given.source];
-  if (as_it_is && !image.uri.empty() && !image.uri.starts_with("data:") && image.bufferView < 0) {
+  const GltfImage& image = file_.images()[source];
+  const bool is_file = !image.uri.empty() && !image.uri.starts_with("data:");
+  if (is_file && file_.path_of_image(source).empty()) return nullptr;  // reported
+  if (as_it_is && is_file && !lower(image.uri).ends_with(".webp")) {
     set_property(*bitmap, "filename", file_of_uri(image.uri));
     return bitmap;
   }
-  const Pixels* pixels = decoded(given.source);
+  const Pixels* pixels = decoded(source);
   if (!pixels) return nullptr;
   set_property(*bitmap, std::string(kEmbeddedData), embedded(*pixels, use));
   return bitmap;
+}
+
+int GltfTextures::source_of(int texture) {
+  const tinygltf::Texture& given = file_.model().textures[texture];
+  const auto is_there = [&](int image) { return image >= 0 && static_cast<size_t>(image) < file_.images().size(); };
+  if (is_there(given.source)) return given.source;
+  for (const char* name : {"EXT_texture_webp", "KHR_texture_basisu", "MSFT_texture_dds"})
+    if (const tinygltf::Value* khr = find_extension(given.extensions, name))
+      if (const int image = extension_index(*khr, "source"); is_there(image)) return image;
+  file_.error(fmt::format("texture {} has no image", texture));
+  return -1;
 }
 
 const GltfTextures::Pixels* GltfTextures::decoded(int index) {
   if (const auto found = images_.find(index); found != images_.end())
     return found->second.width > 0 ? &found->second : nullptr;
   Pixels& pixels = images_[index];
-  tinygltf::Image image = file_.model().images[index];
-  if (image.bufferView < 0 && !image.uri.empty()) file_.reads(image.uri);
-  const std::string name = image.uri.empty() ? image.name : image.uri.substr(0, 40);
-  const auto [width, height] = size_of(image.image);
+  const std::string bytes = file_.bytes_of_image(index);
+  const auto [width, height] = size_of(bytes);
   const auto fail = [&](const std::string& why) {
-    file_.error(fmt::format("image {} '{}' {}", index, name, why));
+    const GltfImage& image = file_.images()[index];
+    file_.error(fmt::format("image {} '{}' {}", index, image.uri.empty() ? image.name : image.uri.substr(0, 40), why));
     return nullptr;
   };
-  if (width <= 0 || height <= 0 || width > 32768 || height > 32768)
-    return fail("is not a readable PNG or JPEG picture");
+  if (bytes.empty()) return nullptr;  // reported
+  if (width <= 0 || height <= 0 || width > 32768 || height > 32768) return fail(unknown_format(bytes));
   require_memory(file_.where().text(), fmt::format("image {} of {} x {} pixels", index, width, height),
                  20.0 * width * height);
-  const std::vector<unsigned char> bytes = std::move(image.image);
+  if (is_webp(bytes)) {
+    pixels.values = decode_webp(bytes).rgba;
+    if (pixels.values.empty()) return fail("cannot be decoded: it is damaged");
+    pixels.channels = 4, pixels.width = width, pixels.height = height;
+    return &pixels;
+  }
+  tinygltf::Image image;
   std::string problem, warning;
-  image.image.clear(), image.as_is = false;
-  if (!tinygltf::LoadImageData(&image, index, &problem, &warning, 0, 0, bytes.data(), static_cast<int>(bytes.size()),
+  if (!tinygltf::LoadImageData(&image, index, &problem, &warning, 0, 0,
+                               reinterpret_cast<const unsigned char*>(bytes.data()), static_cast<int>(bytes.size()),
                                nullptr) ||
       image.width != width || image.height != height || image.component < 1 || (image.bits != 8 && image.bits != 16))
     return fail("cannot be decoded: it is damaged");
@@ -130,7 +167,8 @@ const GltfTextures::Pixels* GltfTextures::decoded(int index) {
 
 std::string GltfTextures::embedded(const Pixels& pixels, const GltfUse& use) const {
   const size_t n = static_cast<size_t>(pixels.width) * pixels.height;
-  const bool one = use.kind == GltfUse::kChannel, plain = use.factor == Spectrum(1) || use.cutoff >= 0;
+  const bool one = use.kind == GltfUse::kChannel;
+  const bool plain = (use.factor == Spectrum(1) && use.offset == 0) || use.cutoff >= 0;
   const auto value = [&](size_t i, int c) {  // grey images: equal in all channels, opaque
     const int n_colours = pixels.channels < 3 ? 1 : 3;
     if (c == 3)
@@ -151,13 +189,23 @@ std::string GltfTextures::embedded(const Pixels& pixels, const GltfUse& use) con
   // PFM: linear floats, bottom row first.
   std::string text = fmt::format("P{}\n{} {}\n-1.0\n", one ? 'f' : 'F', pixels.width, pixels.height);
   for (int y = pixels.height - 1; y >= 0; --y)
-    for (int x = 0; x < pixels.width; ++x)
-      for (int c = 0; c < channels; ++c) {
-        const float raw =
-            static_cast<float>(value(static_cast<size_t>(y) * pixels.width + x, one ? use.channel : c)) / 255;
-        const float linear = (use.kind == GltfUse::kColour ? srgb_to_linear(raw) : raw) * use.factor[c];
-        text.append(reinterpret_cast<const char*>(&linear), sizeof(linear));
+    for (int x = 0; x < pixels.width; ++x) {
+      const auto raw = [&](int c) {
+        return static_cast<float>(value(static_cast<size_t>(y) * pixels.width + x, c)) / 255;
+      };
+      Spectrum linear(one ? raw(use.channel) : raw(0), one ? 0 : raw(1), one ? 0 : raw(2));
+      if (use.kind == GltfUse::kNormal) {
+        const float scale = use.factor.r;
+        const Vec3 normal =
+            normalize({(2 * linear.r - 1) * scale, (2 * linear.g - 1) * scale, std::max(2 * linear.b - 1, 1e-3f)});
+        linear = Spectrum(0.5f + 0.5f * normal.x, 0.5f + 0.5f * normal.y, 0.5f + 0.5f * normal.z);
+      } else {
+        for (int c = 0; c < channels; ++c)
+          linear[c] =
+              (use.kind == GltfUse::kColour ? srgb_to_linear(linear[c]) : linear[c]) * use.factor[c] + use.offset;
       }
+      for (int c = 0; c < channels; ++c) text.append(reinterpret_cast<const char*>(&linear[c]), sizeof(float));
+    }
   return text;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // glTF textures as bitmaps. Images in separate files that are used unchanged stay there; others become part of the
-// description: single channels, colours with a factor, embedded images.
+// description: single channels, colours with a factor, embedded images, WebP.
 #pragma once
 
 #include <cstdint>
@@ -18,11 +18,13 @@ struct GltfUse {
   enum Kind {
     kColour,   ///< sRGB, times `factor`
     kVector,   ///< three linear channels, unchanged
-    kChannel,  ///< one linear channel, times factor.r
+    kNormal,   ///< a normal whose x and y are scaled by factor.r
+    kChannel,  ///< one linear channel, times factor.r, plus `offset`
   } kind = kColour;
   int channel = 0;  ///< of kChannel; 3: alpha
   Spectrum factor{1};
   double cutoff = -1;  ///< of kChannel: 1 from this value on, otherwise 0; negative: none
+  float offset = 0;
 };
 
 class GltfTextures {
@@ -36,6 +38,8 @@ class GltfTextures {
     int width = 0, height = 0, channels = 0;
     std::vector<uint8_t> values;
   };
+  /// The image of a texture in a format that is read, if it has one; -1 after an error.
+  int source_of(int texture);
   /// Null after an error.
   const Pixels* decoded(int image);
   std::string embedded(const Pixels& pixels, const GltfUse& use) const;

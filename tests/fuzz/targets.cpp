@@ -69,7 +69,9 @@ bool pbrt(Bytes input) {
   return accepts([&] { load_scene_text(text_of(input), "/no/such/folder/scene.pbrt"); });
 }
 bool gltf(Bytes input) {
-  return accepts([&] { load_scene_text(text_of(input), "/no/such/folder/scene.gltf"); });
+  LoadOptions options;
+  options.view.environment = "auto";
+  return accepts([&] { load_scene_text(text_of(input), "/no/such/folder/scene.gltf", options); });
 }
 bool tensor(Bytes input) {
   const InputFile input_file(input);
