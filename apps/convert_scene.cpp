@@ -14,15 +14,20 @@
 #include "film/outputs.h"
 #include "formats/file_resolver.h"
 #include "plans/integrator_choice.h"
+#include "settings/option_names.h"
 #include "value_names.h"
 
 namespace covary {
 namespace fs = std::filesystem;
 namespace {
 
+/// Default: the picture that `covary render` makes.
+const SceneView kConvertedView{.environment = "auto"};
+
 struct ConvertSceneOptions {
   std::string input, output;
   std::vector<std::string> defines;
+  OptionValues view;
   bool overwrite = false;
 };
 
@@ -68,6 +73,7 @@ void convert_scene(const ConvertSceneOptions& options) {
   LoadOptions load_options;
   load_options.defines = parse_defines(options.defines);
   load_options.make_integrator = integrator_maker({});
+  load_options.view = settings_from<SceneView>(options.view, kConvertedView);
   const ConvertedScene scene = convert_scene(options.input, options.output, load_options);
   for (const std::string& file : scene.files)
     if (is_same_file(file, options.output))
@@ -78,7 +84,7 @@ void convert_scene(const ConvertSceneOptions& options) {
                 fmt::format("the scene has meshes or images in its own file, which become files beside the new one: "
                             "the output '{}' must be the name of a file",
                             options.output));
-  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
+  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));
   write_files(options, scene);
 }
 
@@ -98,6 +104,7 @@ void add_convert_scene(CLI::App& app) {
       ->option_text("OUT.xml")
       ->required();
   add_define_option(*command, o->defines);
+  add_options(*command, options_of<SceneView>(kConvertedView), o->view);
   command->add_flag("--overwrite", o->overwrite, "Replace OUT.xml and its files");
   command->callback([o] { convert_scene(*o); });
 }

@@ -69,6 +69,7 @@ std::map<std::string, double> memory_of_renders(const LoadedScene& scene) {
 void scene_info(const InfoOptions& options) {
   LoadOptions load_options;
   load_options.defines = parse_defines(options.defines);
+  load_options.view.environment = "auto";
   const LoadedScene scene = load_scene(options.path, load_options);
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));
   const std::map<std::string, double> memory = memory_of_renders(scene);

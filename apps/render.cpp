@@ -132,6 +132,9 @@ void report(const RenderReport& report, const StopFlag& stop) {
   for (const Pass& pass : result.passes) report_bad_samples(options, pass);
   if (!options.json.empty()) write_text_output(options.json, json_text(statistics(report)));
   if (result.interrupted) throw Unfinished(stop.exit_code(), interruption(options, result));
+  if (result.preview_stops != 0 && options.request().exposure == kAutomaticExposure)
+    fmt::print(stderr, "note: '{}' is exposed by {:+g} stops, or much of it would be burnt or black (--exposure)\n",
+               preview_path(options.request().output), result.preview_stops);
   if (!options.quiet) print_summary(report);
   const std::string doubt = result.predicted ? result.predicted->doubt : "";
   if (!doubt.empty() && result.until_reached.value_or(false))

@@ -89,6 +89,7 @@ LoadedScene load(const RenderOptions& options) {
   LoadOptions load_options;
   load_options.defines = parse_defines(options.defines);
   load_options.width = options.settings.width, load_options.height = options.settings.height;
+  load_options.view = options.settings.view;
   load_options.make_integrator = integrator_maker({options.settings.integrator, options.of_integrator});
   LoadedScene scene = load_scene(options.scene, load_options);
   check_integrator(options, scene);

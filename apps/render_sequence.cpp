@@ -67,7 +67,7 @@ RenderOptions frame_options(const RenderOptions& options, int frame) {
 std::string frame_hash(const RenderOptions& one, const LoadedScene& scene, const Transform& before,
                        const std::string& earlier) {
   OptionValues values = one.values;
-  for (const char* option : {"output", "passes", "resume", "overwrite", "checkpoint", "no-preview"})
+  for (const char* option : {"output", "passes", "resume", "overwrite", "checkpoint", "no-preview", "exposure"})
     values.erase(option);
   std::string text = scene.content_hash;
   if (one.sequence.history) text += " history " + earlier;
@@ -192,6 +192,7 @@ class SequenceRender {
     if (stop.is_set()) throw Unfinished(stop.exit_code(), interruption(index));
     if (has_many_scenes()) load_scene(one, std::span(outputs_).subspan(index, 1));
     RenderRequest request = make_request(one, *scene_);
+    if (preview_stops_) request.exposure = *preview_stops_;
     const bool follows = frame - 1 == last_frame_;  // the previous frame is unknown otherwise
     const Transform now = times_.camera(*scene_, frame).value_or(own_camera_);
     const Transform before = times_.camera(*scene_, frame - 1).value_or(follows ? last_camera_ : now);
@@ -210,6 +211,7 @@ class SequenceRender {
       history.before = history_of(frame_name(options_.request().output, frame - 1), request);
     ProgressLine progress(fmt::format("{} frame {}", stem(), frame), options_.quiet);
     const RenderResult result = render_watched(one, *scene_, request, display_.get(), progress, stop);
+    if (!preview_stops_) preview_stops_ = result.preview_stops;  // or the frames would flicker
     try {
       report({one, *scene_, result, load_seconds_, threads_}, stop);
     } catch (const Unfinished& unfinished) {
@@ -234,6 +236,7 @@ class SequenceRender {
   std::optional<LoadedScene> scene_;
   Transform own_camera_;  // of the scene, without the path
   double load_seconds_ = 0;
+  std::optional<double> preview_stops_;
   std::vector<int> missed_;
   int last_frame_ = -2;
   Transform last_camera_;

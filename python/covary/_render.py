@@ -45,11 +45,15 @@ class Scene:
     @checked(path=path,
              resolution=optional(several("(width, height), each from 1 to 65536", whole(1, 65536), whole(1, 65536))),
              integrator=text, min_depth=optional(whole(0, 1 << 30)), max_depth=optional(whole(-1, 1 << 30)),
-             integrator_options=_SCALARS, defines=_SCALARS)
+             integrator_options=_SCALARS, defines=_SCALARS, environment=either("a name or a file", path),
+             background=optional(either("a grey, or (R, G, B), linear numbers", real(0),
+                                        several("", real(0), real(0), real(0)))),
+             camera=either("a name or a number from 1", text, whole(1)))
     def load(path: str | PathLike[str], *, resolution: tuple[int, int] | None = None, integrator: str = "",
              min_depth: int | None = None, max_depth: int | None = None,
              integrator_options: Mapping[str, bool | int | float | str] | None = None,
-             defines: Mapping[str, object] | None = None) -> Scene:
+             defines: Mapping[str, object] | None = None, environment: str | PathLike[str] = "auto",
+             background: float | tuple[float, float, float] | None = None, camera: str | int = "") -> Scene:
         """Reads a scene: Mitsuba XML, pbrt or glTF; or "room" and the other scenes.names() that come with the package.
 
         resolution: (width, height) of the full frame, instead of the scene's.
@@ -57,12 +61,18 @@ class Scene:
         min_depth, max_depth: minimum and maximum edges of a path; -1 for no limit.
         integrator_options: properties of the <integrator> element, which override the file's.
         defines: values of the scene's <default> names, as by -D on the command line.
+        environment: light from all around instead of the scene's own: "studio", "sky", "white", an image file, or
+            "none"; "auto" is a studio with a floor if the scene has no light, or, in glTF, none that matters.
+        background: linear colour where the camera sees no surface; it sheds no light.
+        camera: name or number, from 1, of one of the scene's cameras; "auto" frames everything.
         Raises InputError with every problem of the file.
         """
         texts = {name: str(value) for name, value in (defines or {}).items()}
+        view = option_texts({"environment": None if environment == "auto" else fspath(environment),
+                             "background": background, "camera": None if camera == "" else str(camera)})
         return Scene(_file_of(fspath(path)), {"defines": texts, "resolution": resolution, "integrator": integrator,
                                     "min_depth": min_depth, "max_depth": max_depth,
-                                    "integrator_options": dict(integrator_options or {})})
+                                    "integrator_options": dict(integrator_options or {}), "view": view})
 
     @checked(integrator=text)
     def with_integrator(self, integrator: str) -> Scene:
@@ -147,7 +157,7 @@ def _check_scene_arguments(scene: PathOrScene, options: Mapping[str, Any]) -> No
 
 #: Options that are keywords as declared, without those that are arguments by another name or belong to Scene.load().
 _DECLARED = {name: rule for name, rule in declared_rules(_covary.render_options()).items()
-             if name not in ("rfilter", "no_preview", "resolution")}
+             if name not in ("rfilter", "no_preview", "resolution", "environment", "background", "camera")}
 
 
 @checked(_DECLARED,
@@ -211,7 +221,7 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
         "integrator": loading["integrator"] or None, "estimator": estimator, "denoise": denoise,
         "oidn": fspath(oidn) or None, "resolution": loading["resolution"], "crop": crop, "passes": passes,
         "resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "no-preview": not preview, "split": split,
-        "rfilter": filter, **declared})
+        "rfilter": filter, **loading["view"], **declared})
     properties = {"min_depth": loading["min_depth"], "max_depth": loading["max_depth"], **loading["integrator_options"]}
     of_integrator = {name.replace("_", "-"): {"True": "on", "False": "off"}.get(str(value), str(value))
                      for name, value in properties.items() if value is not None}

@@ -37,6 +37,7 @@ struct SceneChoice {
   std::optional<std::pair<int, int>> resolution;
   std::string integrator;
   std::optional<int> min_depth, max_depth;
+  Options view;  ///< of SceneView
 };
 
 std::shared_ptr<LoadedScene> load(const std::string& path, const SceneChoice& choice, nb::dict integrator_options) {
@@ -56,6 +57,7 @@ std::shared_ptr<LoadedScene> load(const std::string& path, const SceneChoice& ch
   if (choice.min_depth) integrator.options["min-depth"] = std::to_string(*choice.min_depth);
   if (choice.max_depth) integrator.options["max-depth"] = std::to_string(*choice.max_depth);
   options.make_integrator = integrator_maker(integrator);
+  options.view = settings_from<SceneView>(choice.view, RenderSettings().view);
   auto scene = std::make_shared<LoadedScene>();
   run_work([&](WorkState& state) { run_stoppable(state, [&] { *scene = load_scene(path, options); }); }, nb::none());
   return scene;
@@ -218,14 +220,14 @@ void bind_render(nb::module_& module) {
       "load_scene",
       [](const std::string& path, const Options& defines, std::optional<std::pair<int, int>> resolution,
          const std::string& integrator, std::optional<int> min_depth, std::optional<int> max_depth,
-         nb::dict integrator_options) {
-        return load(path, {defines, resolution, integrator, min_depth, max_depth}, integrator_options);
+         nb::dict integrator_options, const Options& view) {
+        return load(path, {defines, resolution, integrator, min_depth, max_depth, view}, integrator_options);
       },
       "path"_a, "defines"_a, "resolution"_a.none(), "integrator"_a, "min_depth"_a.none(), "max_depth"_a.none(),
-      "integrator_options"_a,
-      nb::sig(
-          "def load_scene(path: str, defines: dict[str, str], resolution: tuple[int, int] | None, integrator: str, "
-          "min_depth: int | None, max_depth: int | None, integrator_options: dict[str, typing.Any]) -> LoadedScene"));
+      "integrator_options"_a, "view"_a,
+      nb::sig("def load_scene(path: str, defines: dict[str, str], resolution: tuple[int, int] | None, integrator: str, "
+              "min_depth: int | None, max_depth: int | None, integrator_options: dict[str, typing.Any], "
+              "view: dict[str, str]) -> LoadedScene"));
   module.def(
       "render",
       [](const std::shared_ptr<LoadedScene>& scene, const Options& values, const Options& of_integrator,

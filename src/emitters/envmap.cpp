@@ -15,6 +15,8 @@
 #include "emitters/registry.h"
 #include "emitters/rotation.h"
 #include "emitters/scene_sphere.h"
+#include "scene/embedded_data.h"
+#include "textures/image.h"
 
 namespace covary {
 namespace {
@@ -84,7 +86,8 @@ class EnvironmentMap final : public Emitter {
 }  // namespace
 
 std::shared_ptr<Emitter> make_envmap(Parameters& parameters) {
-  const std::string path = parameters.require_file("filename");
+  const std::string* data = find_embedded(parameters);
+  const std::string path = data ? "" : parameters.require_file("filename");
   const float scale = parameters.get_float("scale", 1, 0);
   const bool equal_area =
       parameters.get_choice("mapping", "latitude_longitude", {"latitude_longitude", "equal_area"}) == "equal_area";
@@ -96,13 +99,13 @@ std::shared_ptr<Emitter> make_envmap(Parameters& parameters) {
   } catch (const Error& error) {
     parameters.error_at("to_world", error.what());
   }
-  if (path.empty()) return nullptr;  // already reported
+  if (path.empty() && !data) return nullptr;  // already reported
   try {
+    const TexelImage image = data ? read_embedded_image(*data) : read_linear_rgb(path);
     if (equal_area)
-      return std::make_shared<EnvironmentMap<EqualAreaImage>>(
-          EqualAreaImage(read_linear_rgb(path), scale, mis_compensation), rotation);
-    return std::make_shared<EnvironmentMap<EnvironmentImage>>(
-        EnvironmentImage(read_linear_rgb(path), scale, mis_compensation), rotation);
+      return std::make_shared<EnvironmentMap<EqualAreaImage>>(EqualAreaImage(image, scale, mis_compensation), rotation);
+    return std::make_shared<EnvironmentMap<EnvironmentImage>>(EnvironmentImage(image, scale, mis_compensation),
+                                                              rotation);
   } catch (const Error& error) {
     parameters.error_at("filename", std::string("cannot be used: ") + error.what());
     return nullptr;

@@ -205,14 +205,14 @@ class BidirectionalTracer final : public LightTracingIntegrator {
   /// s = 0: contribution of what the path's ray hit.
   Spectrum emission(const Scene& scene, const UniformLights& lights, int depth, const Path& path, const Ray& ray,
                     const SurfaceHit& hit, const State& state) const {
-    const Emitter* emitter = emitter_met(path, hit, scene.environment(), lengths_.hide_emitters);
+    const Emitter* emitter = emitter_met(path, hit, scene, scene.environment(), lengths_.hide_emitters);
     if (!emitter) return {};
     const EnvironmentLight light = light_met(*emitter, path, ray, hit);
     const Spectrum radiance = path.throughput * light.radiance;
     if (is_black(radiance)) return {};
     const SubpathSums& left = state.sums[path.sample];
     double weight = 1;
-    if (depth > 0 && left.any()) {
+    if (depth > 0 && left.any() && emitter != scene.background()) {
       const float pdf_light = path.found ? emitter->pdf_solid_angle(path.previous_p, hit) : light.pdf_solid_angle;
       const LightPdfs pdfs =
           light_pdfs(*emitter, lights.pmf(*emitter), pdf_light, emission_lights_->pmf(*emitter),

@@ -73,7 +73,7 @@ class ControlledTracer {
     const SurfaceHit& hit = batch_.hits[i];
     EnvironmentLight light;
     if (depth + 1 >= lengths_.min_depth)
-      if (const Emitter* emitter = emitter_met(path, hit, control_.environment, lengths_.hide_emitters))
+      if (const Emitter* emitter = emitter_met(path, hit, scene_, control_.environment, lengths_.hide_emitters))
         light = light_met(*emitter, path, batch_.rays[i], hit);
     ControlledVertex& vertex = batch_.vertices[path.sample];
     float r = 1;

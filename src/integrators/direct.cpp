@@ -57,6 +57,7 @@ class DirectIntegrator final : public Integrator {
     const Vec3& d = batch.rays[i].d;
     if (batch.paths[i].found)
       return batch.hits[i].emitter ? batch.hits[i].emitter->surface_radiance(batch.hits[i], -d) : Spectrum();
+    if (scene.background()) return scene.background()->environment(d).radiance;
     return scene.environment() && !lengths_.hide_emitters ? scene.environment()->environment(d).radiance : Spectrum();
   }
 
@@ -103,8 +104,11 @@ class DirectIntegrator final : public Integrator {
       if (!next.valid() || is_black(next.weight)) continue;
       const Vec3 wi = hit.frame.to_world(next.wi);
       Ray ray{offset_origin(hit, wi), wi, kInfinity};
-      const bool hidden = lengths_.hide_emitters && (next.flags & kNullTransmission);
-      const Found found = light_along(scene, lights, hit.p, ray, hidden, context);
+      const bool passes = next.flags & kNullTransmission;
+      const Emitter* environment = passes && scene.background()       ? scene.background()
+                                   : passes && lengths_.hide_emitters ? nullptr
+                                                                      : scene.environment();
+      const Found found = light_along(scene, lights, hit.p, ray, environment, context);
       if (is_black(found.radiance)) continue;
       const float weight = next.is_delta() ? 1 : mis::power(next.pdf * direction_share_, found.pdf * light_share_);
       samples[batch.paths[i].sample].radiance += next.weight * found.radiance * (weight * each);
@@ -116,7 +120,7 @@ class DirectIntegrator final : public Integrator {
     float pdf = 0;  // density of finding it by light samples
   };
   static Found light_along(const Scene& scene, const UniformLights& lights, const Vec3& from, const Ray& ray,
-                           bool hide_environment, PathContext& context) {
+                           const Emitter* environment, PathContext& context) {
     SurfaceHit hit;
     ++context.n_rays;
     if (scene.intersect(ray, hit)) {
@@ -124,9 +128,9 @@ class DirectIntegrator final : public Integrator {
       return {hit.emitter->surface_radiance(hit, -ray.d),
               lights.pmf(*hit.emitter) * hit.emitter->pdf_solid_angle(from, hit)};
     }
-    const Emitter* environment = hide_environment ? nullptr : scene.environment();
     if (!environment) return {};
     const EnvironmentLight light = environment->environment(ray.d);
+    if (environment == scene.background()) return {light.radiance};
     return {light.radiance, lights.pmf(*environment) * light.pdf_solid_angle};
   }
 

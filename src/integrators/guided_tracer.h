@@ -158,7 +158,7 @@ class GuidedTracer {
     const Path& path = batch_.paths[i];
     const SurfaceHit& hit = batch_.hits[i];
     if (depth + 1 < lengths_.min_depth) return;
-    const Emitter* emitter = emitter_met(path, hit, guided_.environment, lengths_.hide_emitters);
+    const Emitter* emitter = emitter_met(path, hit, scene_, guided_.environment, lengths_.hide_emitters);
     if (!emitter) return;
     const EnvironmentLight light = light_met(*emitter, path, batch_.rays[i], hit);
     if (is_black(light.radiance)) return;

@@ -44,7 +44,8 @@ bool MediumPath::advance() {
     if (t < kInfinity) return scatter_in_medium(ray_.at(t));
   }
   if (!found) {
-    if (const Emitter* light = scene_.environment()) add_emission(*light, nullptr);
+    const bool seen = only_null_ && scene_.background();
+    if (const Emitter* light = seen ? scene_.background() : scene_.environment()) add_emission(*light, nullptr);
     return false;
   }
   const bool hidden = hit.emitter && lengths_.hide_emitters && only_null_;
@@ -139,13 +140,14 @@ bool MediumPath::play_roulette(uint32_t vertex) {
 
 /// Adds light hit by the ray, on a surface or, without `hit`, at infinity.
 void MediumPath::add_emission(const Emitter& emitter, const SurfaceHit* hit) {
-  if (depth_ + 1 < lengths_.min_depth || (!hit && lengths_.hide_emitters && only_null_)) return;
+  const bool background = &emitter == scene_.background();
+  if (depth_ + 1 < lengths_.min_depth || (!hit && lengths_.hide_emitters && only_null_ && !background)) return;
   const EnvironmentLight light =
       hit ? EnvironmentLight{emitter.surface_radiance(*hit, -ray_.d)} : emitter.environment(ray_.d);
   const Spectrum radiance = weights_.throughput * light.radiance;
   if (is_black(radiance)) return;
   Spectrum pdf = weights_.pdf_path;
-  if (!only_direction_) {
+  if (!only_direction_ && !background) {
     const float pdf_light = hit ? emitter.pdf_solid_angle(previous_p_, *hit) : light.pdf_solid_angle;
     pdf += weights_.pdf_light * (lights_.pmf(emitter) * pdf_light);
   }

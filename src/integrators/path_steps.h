@@ -142,11 +142,12 @@ void keep_alive(Batch& batch) {
   batch.resize(batch.alive.size());
 }
 
-/// The emitter that the ray of a path may have hit, on a surface or the environment, or null.
-inline const Emitter* emitter_met(const PathState& path, const SurfaceHit& hit, const Emitter* environment,
-                                  bool hide_emitters) {
+/// The emitter that the ray of a path may have hit, on a surface, the background or the `environment`, or null.
+inline const Emitter* emitter_met(const PathState& path, const SurfaceHit& hit, const Scene& scene,
+                                  const Emitter* environment, bool hide_emitters) {
   if (path.found) return hit.emitter;
-  return hide_emitters && path.only_null ? nullptr : environment;
+  if (!path.only_null) return environment;
+  return scene.background() ? scene.background() : hide_emitters ? nullptr : environment;
 }
 /// Its radiance along the ray; the density is that of the environment.
 inline EnvironmentLight light_met(const Emitter& emitter, const PathState& path, const Ray& ray,

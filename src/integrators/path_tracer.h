@@ -200,7 +200,7 @@ class PathTracer final : public Integrator {
 
     /// Contribution of what the path's ray hit, weighted against light sampling.
     Spectrum emission(const Path& path, const Ray& ray, const SurfaceHit& hit) const {
-      const Emitter* emitter = emitter_met(path, hit, scene.environment(), tracer.lengths_.hide_emitters);
+      const Emitter* emitter = emitter_met(path, hit, scene, scene.environment(), tracer.lengths_.hide_emitters);
       if (!emitter) return {};
       const EnvironmentLight light = light_met(*emitter, path, ray, hit);
       const Spectrum radiance = path.throughput * light.radiance;

@@ -195,10 +195,12 @@ std::shared_ptr<const ObjectDescription> for_mitsuba(const ObjectDescription& sc
 
 ConvertedScene convert_scene(const std::string& path, const std::string& output, const LoadOptions& options) {
   ConvertedScene result;
+  std::vector<ObjectPtr> added;
   {
     const LoadedScene loaded = load_scene(path, options);
     result.files = loaded.files;
     result.warnings = loaded.warnings;
+    added = loaded.added;
   }
   result.files.push_back(path);
   const FileView file(path);
@@ -208,7 +210,10 @@ ConvertedScene convert_scene(const std::string& path, const std::string& output,
   const auto find_file = [&](const std::string& name, const SourceLocation& where) {
     return files.resolve(name, where, diagnostics);
   };
-  result.description = for_mitsuba(*xml.scene, find_file, result.warnings);
+  const auto viewed = with_view(*xml.scene, options.view, added, diagnostics);
+  if (options.view.background)
+    result.warnings.push_back(path + ": `background` is not written: Mitsuba's cameras see the light from all around");
+  result.description = for_mitsuba(*viewed, find_file, result.warnings);
   const fs::path folder = fs::path(output).parent_path();
   SceneWriting writing{comment_on(path), fs::path(output).stem().string() + "-files", {}, recode};
   writing.file_name = [&](const std::string& name, const SourceLocation& where) {

@@ -34,16 +34,19 @@ class Loader {
   void load(std::string_view text, const std::string& name) {
     const Stopwatch watch;
     xml_ = read_scene_file(text, name, options_.defines, files_, diagnostics_);
+    is_gltf_ = is_gltf_file(name);
+    sensor_ = chosen_sensor(*xml_.scene, options_.view, diagnostics_);
     jobs_.collect(*xml_.scene);
     jobs_.run(diagnostics_);
     assemble();
     for (const auto& file : files_.files()) result_.files.push_back(file.first);
-    result_.files_hash = result_.content_hash = files_.content_hash(hash_text(xml_.hash));
+    result_.files_hash = result_.content_hash =
+        files_.content_hash(hash_text(xml_.hash) + text_of(options_.view, result_.added));
     result_.warnings = diagnostics_.warnings();
     diagnostics_.throw_if_errors();
     require_table_memory(name, parts_);
     result_.read_seconds = watch.seconds();
-    result_.has_delta_lights_and_surfaces = has_delta_lights() && has_delta_surfaces();
+    result_.has_delta_lights_and_surfaces = has_delta_lights_and_surfaces(parts_);
     result_.scene = std::make_unique<Scene>(std::move(parts_));
     result_.scene->move_to(sensor_made_->shutter_open);
     const auto name_of = [&](const Shape& shape) { return names_[&shape]; };
@@ -51,19 +54,6 @@ class Loader {
   }
 
  private:
-  bool has_delta_lights() const {
-    return std::any_of(parts_.emitters.begin(), parts_.emitters.end(), [](const auto& e) { return e->is_delta(); });
-  }
-  bool has_delta_surfaces() const {
-    const auto any = [](const std::vector<ShapePtr>& shapes) {
-      return std::any_of(shapes.begin(), shapes.end(), [](const ShapePtr& shape) {
-        return shape->bsdf() && shape->bsdf()->flags() & (kDeltaReflection | kDeltaTransmission);
-      });
-    };
-    return any(parts_.shapes) || std::any_of(parts_.instances.begin(), parts_.instances.end(),
-                                             [&](const Instance& instance) { return any(instance.group->shapes); });
-  }
-
   void assemble() {
     held_ = held_objects(*xml_.scene);
     for (const Property& property : xml_.scene->properties) {
@@ -79,15 +69,42 @@ class Loader {
       description->kind = "integrator", description->type = "path", description->where = xml_.scene->where;
       place_integrator(description);
     }
+    complete_view();
     jobs_.append_diagnostics_of_shapes(diagnostics_);
-    if (n_degenerate_ > 0)
-      diagnostics_.warn({}, fmt::format("{} triangles of zero area in {} meshes were left out, the first in {}",
-                                        n_degenerate_, n_degenerate_meshes_, first_degenerate_.text()));
-    if (!sensor_) {
-      diagnostics_.error(xml_.scene->where, "the scene has no sensor");
-    } else if (sensor_made_) {
-      set_up_camera(*sensor_made_);
+    degenerate_.tell(diagnostics_);
+    if (!sensor_ && !(diagnostics_.has_errors() && (is_gltf_ || !options_.view.camera.empty())))
+      diagnostics_.error(xml_.scene->where, is_gltf_ ? "no triangles, and no camera" : "the scene has no sensor");
+    if (sensor_made_) set_up_camera(*sensor_made_);
+  }
+
+  /// Adds what the caller wants to see that the file does not have: a camera, surroundings.
+  void complete_view() {
+    const SceneView& view = options_.view;
+    const SourceLocation where{xml_.scene->where.file, 0, 0};
+    Orientation orientation = orientation_of(is_gltf_ || !sensor_made_ ? nullptr : &sensor_made_->camera);
+    const Bounds3 bounds = bounds_of(parts_);
+    if (!sensor_ && !bounds.empty() && (view.camera == "auto" || (is_gltf_ && view.camera.empty()))) {
+      const ObjectPtr like = first_sensor(*xml_.scene);
+      const auto made = like ? std::dynamic_pointer_cast<const SensorSettings>(factory_.make(like)) : nullptr;
+      if (!is_gltf_ && made) orientation = orientation_of(&made->camera);
+      const float aspect = aspect_of(made.get(), options_.width, options_.height);
+      sensor_ = framed_sensor(bounds, orientation, like.get(), aspect, where);
+      sensor_made_ = std::dynamic_pointer_cast<const SensorSettings>(factory_.make(sensor_));
+      result_.added.push_back(sensor_);
+      if (view.camera.empty()) diagnostics_.warn(where, "the file has no camera: everything is framed, from the front");
     }
+    result_.sensor = sensor_;
+    if (!sensor_made_) return;
+    const Surroundings around = surroundings(view, parts_, sensor_made_->camera, orientation, is_gltf_, where);
+    for (const ObjectPtr& object : around.objects) {
+      if (object->kind == "shape") jobs_.make_shape(object);
+      place(object);
+      result_.added.push_back(object);
+    }
+    if (!around.told.empty()) diagnostics_.warn(where, around.told);
+    if (view.background)
+      parts_.background = std::dynamic_pointer_cast<const Emitter>(
+          factory_.make(make_object("emitter", "constant", where, {{"radiance", ColourValue{*view.background}}})));
   }
 
   void place(const ObjectPtr& object) {
@@ -108,13 +125,7 @@ class Loader {
     } else if (kind == "emitter") {
       place_emitter(object);
     } else if (kind == "sensor") {
-      if (sensor_) {
-        diagnostics_.warn(object->where, "the scene has several sensors; this one is not used, but the one at " +
-                                             sensor_->where.text());
-        return;
-      }
-      sensor_ = object;
-      sensor_made_ = std::dynamic_pointer_cast<const SensorSettings>(factory_.make(object));
+      if (object == sensor_) sensor_made_ = std::dynamic_pointer_cast<const SensorSettings>(factory_.make(object));
     } else if (kind == "integrator") {
       place_integrator(object);
     } else if (kind == "bsdf" || kind == "texture" || is_part_of_media(kind)) {
@@ -157,11 +168,7 @@ class Loader {
         parts_.emitters.push_back(light);
       }
     }
-    if (const auto* mesh = dynamic_cast<const TriangleMesh*>(job.shape.get()); mesh && mesh->n_degenerate() > 0) {
-      if (n_degenerate_ == 0) first_degenerate_ = job.description->where;
-      n_degenerate_ += mesh->n_degenerate();
-      ++n_degenerate_meshes_;
-    }
+    degenerate_.see(*job.shape, job.description->where);
   }
 
   /// Adds the copy of `original` at `to_world`, or one moved by `animation`.
@@ -227,18 +234,7 @@ class Loader {
   void check_copies(const ObjectDescription& instance, const ShapeGroup& group) {
     const auto lights = group_lights_.find(&group);
     if (lights == group_lights_.end() || !groups_checked_.insert(&group).second) return;
-    const auto group_of = [](const ObjectDescription& description) -> const ObjectDescription* {
-      if (description.kind != "shape" || description.type != "instance") return nullptr;
-      for (const Property& property : description.properties)
-        if (const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value))
-          if (*child && (*child)->kind == "shape") return child->get();
-      return nullptr;
-    };
-    const ObjectDescription* placed = group_of(instance);
-    const auto n = std::count_if(xml_.scene->properties.begin(), xml_.scene->properties.end(), [&](const Property& p) {
-      const ObjectPtr* other = std::get_if<ObjectPtr>(&p.value);
-      return other && *other && group_of(**other) == placed;
-    });
+    const size_t n = n_instances_alike(*xml_.scene, instance);
     double bytes = 0;
     for (const GroupLight& light : lights->second) bytes += array_bytes(*light.shape) + table_bytes(*light.shape, true);
     require_memory(instance.where.text(),
@@ -293,6 +289,10 @@ class Loader {
       return;
     }
     if (emitter->is_environment()) {
+      if (options_.view.replaces_environment() && !object->where.file.empty() && object->where.line > 0) {
+        diagnostics_.warn(object->where, "this light from all around is replaced (`environment`)");
+        return;
+      }
       if (environment_)
         diagnostics_.error(object->where,
                            "a second emitter at infinity; the first is at " + environment_->where.text());
@@ -379,10 +379,10 @@ class Loader {
   };
   DefaultBsdf default_bsdfs_[2];  // of non-emissive and emissive shapes
   ObjectPtr sensor_, integrator_, environment_;
+  bool is_gltf_ = false;
   std::shared_ptr<const SensorSettings> sensor_made_;
   std::map<const Shape*, std::string> names_;  // place in the file and type
-  size_t n_degenerate_ = 0, n_degenerate_meshes_ = 0;
-  SourceLocation first_degenerate_;
+  DegenerateTriangles degenerate_;
 };
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "io/scene_view.h"
 #include "scene/parameters.h"
 #include "scene/scene.h"
 
@@ -16,6 +17,7 @@ namespace covary {
 struct LoadOptions {
   std::map<std::string, std::string> defines;  ///< -D name=value, overriding <default>
   int width = 0, height = 0;                   ///< override the film size when > 0 (the crop is then dropped)
+  SceneView view;                              ///< camera and surroundings; default: as in the file
   /// Creates the integrator from the scene's <integrator> element, so that its errors are reported with all others. If
   /// empty, the element is only recorded in LoadedScene::integrator_type.
   std::function<std::shared_ptr<SceneObject>(Parameters&)> make_integrator;
@@ -37,6 +39,8 @@ struct LoadedScene {
   /// The scene has point or directional lights, and mirrors or smooth glass: only paths from the lights can find the
   /// caustics of the former in the latter.
   bool has_delta_lights_and_surfaces = false;
+  ObjectPtr sensor;              ///< the camera's description
+  std::vector<ObjectPtr> added;  ///< what LoadOptions::view added to the file's objects, the sensor perhaps among it
   std::vector<std::string> warnings;
   std::vector<std::string> files;  ///< paths of all files referenced by the scene's file that were read
   double read_seconds = 0;         ///< parsing and reading files; excludes Scene::build_seconds()

@@ -160,8 +160,7 @@ TEST_F(LoadScene, UsesTheFirstOfSeveralSensors) {
   const LoadedScene s = load(kSensor + "\n<sensor type=\"perspective\"/>");
   EXPECT_EQ(s.width, 32);
   ASSERT_EQ(s.warnings.size(), 1u);
-  EXPECT_TRUE(
-      contains(s.warnings[0], "scene.xml:6:1: the scene has several sensors; this one is not used, but the one at "));
+  EXPECT_TRUE(contains(s.warnings[0], "scene.xml:6:1: the scene has 2 cameras; the first is used"));
 }
 
 TEST_F(LoadScene, MakesTheIntegratorWithItsParameters) {

@@ -93,6 +93,11 @@ void SceneJobs::run(Diagnostics& diagnostics) {
   for (const auto& leaf : leaves_) diagnostics.append(leaf->diagnostics);
 }
 
+void SceneJobs::make_shape(const ObjectPtr& object) {
+  add_shape(object, false);
+  make_surface(*shapes_.back());
+}
+
 ShapeJob* SceneJobs::shape(const ObjectDescription* description) const {
   const auto found = shapes_by_description_.find(description);
   return found == shapes_by_description_.end() ? nullptr : found->second;
@@ -134,6 +139,47 @@ void require_table_memory(const std::string& file, const SceneParts& parts) {
     if (groups.insert(instance.group.get()).second)
       for (const ShapePtr& shape : instance.group->shapes) add(*shape);
   require_memory(file, fmt::format("tracing rays through {} triangles and other shapes", n_primitives), bytes);
+}
+
+void DegenerateTriangles::see(const Shape& shape, const SourceLocation& where) {
+  const auto* mesh = dynamic_cast<const TriangleMesh*>(&shape);
+  if (!mesh || mesh->n_degenerate() == 0) return;
+  if (n_ == 0) first_ = where;
+  n_ += mesh->n_degenerate();
+  ++n_meshes_;
+}
+
+void DegenerateTriangles::tell(Diagnostics& diagnostics) const {
+  if (n_ > 0)
+    diagnostics.warn({}, fmt::format("{} triangles of zero area in {} meshes were left out, the first in {}", n_,
+                                     n_meshes_, first_.text()));
+}
+
+size_t n_instances_alike(const ObjectDescription& scene, const ObjectDescription& instance) {
+  const auto group_of = [](const ObjectDescription& description) -> const ObjectDescription* {
+    if (description.kind != "shape" || description.type != "instance") return nullptr;
+    for (const Property& property : description.properties)
+      if (const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value))
+        if (*child && (*child)->kind == "shape") return child->get();
+    return nullptr;
+  };
+  const ObjectDescription* placed = group_of(instance);
+  const auto n = std::count_if(scene.properties.begin(), scene.properties.end(), [&](const Property& p) {
+    const ObjectPtr* other = std::get_if<ObjectPtr>(&p.value);
+    return other && *other && group_of(**other) == placed;
+  });
+  return static_cast<size_t>(n);
+}
+
+bool has_delta_lights_and_surfaces(const SceneParts& parts) {
+  const auto any = [](const std::vector<ShapePtr>& shapes) {
+    return std::any_of(shapes.begin(), shapes.end(), [](const ShapePtr& shape) {
+      return shape->bsdf() && shape->bsdf()->flags() & (kDeltaReflection | kDeltaTransmission);
+    });
+  };
+  return std::any_of(parts.emitters.begin(), parts.emitters.end(), [](const auto& e) { return e->is_delta(); }) &&
+         (any(parts.shapes) || std::any_of(parts.instances.begin(), parts.instances.end(),
+                                           [&](const Instance& instance) { return any(instance.group->shapes); }));
 }
 
 }  // namespace covary

@@ -48,6 +48,9 @@ class SceneJobs {
   /// Runs all jobs. Problems of textures and emitters go to `diagnostics`; those of shapes stay with their jobs.
   void run(Diagnostics& diagnostics);
 
+  /// Makes a further shape after run().
+  void make_shape(const ObjectPtr& object);
+
   /// The job of a shape that has its own surface; null for other objects.
   ShapeJob* shape(const ObjectDescription* description) const;
 
@@ -81,5 +84,23 @@ double table_bytes(const Shape& shape, bool emits);
 
 /// Throws Error(kInput) if the tables of all shapes need too much memory. `file`: the scene's file, for the message.
 void require_table_memory(const std::string& file, const SceneParts& parts);
+
+/// Counts triangles of zero area, which meshes leave out.
+class DegenerateTriangles {
+ public:
+  void see(const Shape& shape, const SourceLocation& where);
+  /// A warning, if there are any.
+  void tell(Diagnostics& diagnostics) const;
+
+ private:
+  size_t n_ = 0, n_meshes_ = 0;
+  SourceLocation first_;
+};
+
+/// How many instances of the scene place the same group as this one.
+size_t n_instances_alike(const ObjectDescription& scene, const ObjectDescription& instance);
+
+/// LoadedScene::has_delta_lights_and_surfaces
+bool has_delta_lights_and_surfaces(const SceneParts& parts);
 
 }  // namespace covary

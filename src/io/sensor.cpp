@@ -112,4 +112,10 @@ std::shared_ptr<SensorSettings> make_sensor(Parameters& p) {
   return sensor;
 }
 
+float aspect_of(const SensorSettings* sensor, int width, int height) {
+  if (width <= 0) width = sensor ? sensor->film.width : 16;
+  if (height <= 0) height = sensor ? sensor->film.height : 9;
+  return static_cast<float>(width) / static_cast<float>(height);
+}
+
 }  // namespace covary

@@ -34,6 +34,9 @@ struct SensorSettings : SceneObject {
   SamplerSettings sampler;
 };
 
+/// Width over height of a sensor's film, of which either may be overridden by a number > 0; null: 16:9.
+float aspect_of(const SensorSettings* sensor, int width, int height);
+
 // Each records an error for anything it does not support.
 std::shared_ptr<FilterObject> make_filter(Parameters& parameters);
 std::shared_ptr<FilmSettings> make_film(Parameters& parameters);

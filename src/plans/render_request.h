@@ -16,6 +16,9 @@
 
 namespace covary {
 
+/// As film/exposure.h says.
+inline constexpr double kAutomaticExposure = 1e9;
+
 struct RenderRequest {
   uint64_t seed = 0;
   /// Replaces the scene's integrator; if that has choices, the chosen one.
@@ -44,8 +47,9 @@ struct RenderRequest {
   bool light_groups = false;
   bool splits_layers() const { return layers || light_groups; }
 
-  std::string output;    ///< EXR file of the result; empty: no file is written
-  bool preview = false;  ///< also a PNG next to it
+  std::string output;                    ///< EXR file of the result; empty: no file is written
+  bool preview = false;                  ///< also a PNG next to it
+  double exposure = kAutomaticExposure;  ///< of the PNG, in stops
   /// Files of the integrator's training (training_stage.h), written after the training and read instead of it; empty:
   /// none.
   std::string save_training, load_training;
@@ -106,6 +110,9 @@ inline void declare(Settings& s, RenderRequest& r) {
   s.flag("overwrite", r.overwrite, "Replace existing films, and an `output` that another command made");
   s.real("checkpoint", r.checkpoint_seconds, {.low = 0}, "Seconds between saving unfinished films; 0: never");
   r.preview = !s.flag("no-preview", "Do not write the PNG");
+  s.real("exposure", r.exposure, {.low = -40, .high = 40}, NumberWord{"auto", kAutomaticExposure},
+         "Stops by which the PNG is brighter than the image; auto: 0 unless a tenth of it is burnt or black",
+         {.level = OptionLevel::kBasic});
   s.flag("aovs", r.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
   s.whole("aov-samples", r.aov_samples, {.low = 1, .high = 65536},
           "Most samples per pixel of albedo, normal and position; fewer are taken where they have little noise");

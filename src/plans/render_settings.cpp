@@ -92,6 +92,7 @@ void declare(Settings& s, RenderSettings& v) {
   s.group("Rendering");
   s.text_as("resolution", v, "WIDTHxHEIGHT", read_resolution, "Size of the full frame; default: the scene's",
             kBasicSamples);
+  declare(s, v.view);
   declare_passes(s, v.passes);
   declare(s, v.request);
 }

@@ -14,11 +14,12 @@
 namespace covary {
 
 struct RenderSettings {
-  RenderSettings() { request.checkpoint_seconds = 300; }
+  RenderSettings() { request.checkpoint_seconds = 300, view.environment = "auto"; }
 
   std::string integrator;     ///< replaces the scene's; empty: the scene's
   int width = 0, height = 0;  ///< replaces the scene's; 0: the scene's
-  RenderRequest request;      ///< as far as options determine it
+  SceneView view;
+  RenderRequest request;  ///< as far as options determine it
   PassChoice passes;
   std::string estimator = kDefaultEstimator;
   DenoisingChoice denoising;

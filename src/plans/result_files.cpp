@@ -8,6 +8,7 @@
 
 #include "combine/result_file.h"
 #include "estimators/mean.h"
+#include "film/exposure.h"
 #include "film/film_file.h"
 #include "film/image_writer.h"
 #include "integrators/aov.h"
@@ -55,7 +56,10 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
     if (!estimated) mean.estimate = result.picture();
     write_result(request.output, place, attributes, estimated ? result.image : mean, aovs);
   }
-  if (request.preview) write_png(preview_path(request.output), result.picture());
+  if (!request.preview) return;
+  const Image picture = result.picture();
+  result.preview_stops = request.exposure == kAutomaticExposure ? exposure_for_display(picture) : request.exposure;
+  write_png(preview_path(request.output), result.preview_stops == 0 ? picture : exposed(picture, result.preview_stops));
 }
 
 }  // namespace covary

@@ -47,6 +47,9 @@ struct SceneParts {
   std::vector<Movement> movements;
   std::vector<std::shared_ptr<const Emitter>> emitters;  ///< in file order, area lights of `shapes` included
   std::shared_ptr<const Camera> camera;
+  /// An environment that only the camera sees, directly or through null surfaces; null: the environment among the
+  /// emitters.
+  std::shared_ptr<const Emitter> background;
   MediumPtr camera_medium;                    ///< that the camera is in; null: none
   std::optional<ColourMatrix> film_response;  ///< from radiance to the film's values; none: they are the radiance
   std::string first_medium;  ///< location in the file of the first medium that is used; empty: there is none
@@ -118,6 +121,8 @@ class Scene {
   std::span<const std::shared_ptr<const Emitter>> emitters() const { return parts_.emitters; }
   /// The light at infinity that rays leaving the scene hit, or null.
   const Emitter* environment() const { return environment_; }
+  /// SceneParts::background
+  const Emitter* background() const { return parts_.background.get(); }
   bool has_media() const { return !parts_.first_medium.empty(); }
   /// SceneParts::first_medium
   const std::string& first_medium() const { return parts_.first_medium; }

@@ -258,8 +258,9 @@ class Arguments(PackageTest):
         other = {"rfilter": "filter", "no_preview": "preview"}
         taken = set(inspect.signature(covary.render).parameters) - {"scene", "options", "films_only", "progress",
                                                                     "until_p95"}
-        self.assertEqual({other.get(name, name) for name in declared} - {"resolution"}, taken)
-        self.assertIn("resolution", inspect.signature(covary.Scene.load).parameters)
+        of_scene = {"resolution", "environment", "background", "camera"}
+        self.assertEqual({other.get(name, name) for name in declared} - of_scene, taken)
+        self.assertLessEqual(of_scene, set(inspect.signature(covary.Scene.load).parameters))
         for name, parameter in inspect.signature(covary.render).parameters.items():
             lines = re.findall(rf"^(?:.*[ ,])?{name}[,:]", covary.render.__doc__, re.M)
             if parameter.annotation is parameter.empty:  # as declared
