@@ -139,7 +139,7 @@ class MetalRoughClosure final : public BsdfClosure {
   struct View {
     View(const MetalRoughClosure& closure, const Vec3& wo) : front(wo.z > 0) {
       o = closure.turned(front ? wo : -wo, closure.sin_turn_);
-      active = o.z > 0 && (front || (closure.flags_ & kTransmission) != 0);
+      active = o.z > 0 && (front || closure.transmits());
       inside = !front && closure.solid_;
       eta = inside ? 1 / closure.eta_ : closure.eta_;
       if (active) closure.lobe_probabilities(*this);
@@ -159,6 +159,7 @@ class MetalRoughClosure final : public BsdfClosure {
     }
   };
 
+  bool transmits() const { return (flags_ & (kGlossyTransmission | kDiffuseTransmission)) != 0; }
   /// In the frame whose x axis is the direction of anisotropy; back with the opposite sine.
   Vec3 turned(const Vec3& w, float sine) const {
     return {cos_turn_ * w.x + sine * w.y, cos_turn_ * w.y - sine * w.x, w.z};
@@ -233,7 +234,7 @@ class MetalRoughClosure final : public BsdfClosure {
     const float k = coat_ > 0 ? coat_ * coat_fresnel(radiance_ ? view.o.z : std::abs(i.z)) : 0;
     if (i.z > 0)
       reflection_terms(view, i, k, t);
-    else if (i.z < 0 && flags_ & kTransmission) {
+    else if (i.z < 0 && transmits()) {
       solid_ ? refraction_terms(view, i, t) : sheet_terms(view, i, t);
       through_terms(view, i, t);
     }

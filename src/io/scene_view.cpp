@@ -111,17 +111,14 @@ ObjectPtr sky(const Vec3& up, const Vec3& front, const SourceLocation& where) {
 }  // namespace
 
 void declare(Settings& s, SceneView& v) {
-  const OptionTraits basic{.level = OptionLevel::kBasic, .effect = OptionEffect::kSamples};
-  s.group("Rendering");
+  s.group("Rendering", OptionEffect::kSamples);
   s.text("environment", v.environment, "auto|studio|sky|white|none|FILE",
          "Light from all around instead of the scene's own; auto: a studio with a floor if the scene has no light, or, "
-         "in glTF, none that matters",
-         basic);
+         "in glTF, none that matters");
   s.text_as("background", v.background, "R,G,B", read_background,
-            "Colour where the camera sees no surface, a linear grey or R,G,B; it sheds no light",
-            {.effect = OptionEffect::kSamples});
+            "Colour where the camera sees no surface, a linear grey or R,G,B; it sheds no light");
   s.text("camera", v.camera, "NAME|NUMBER|auto",
-         "Which camera of the scene, by its name or number, from 1; auto: one that frames everything", basic);
+         "Which camera of the scene, by its name or number, from 1; auto: one that frames everything");
 }
 
 ObjectPtr chosen_sensor(const ObjectDescription& scene, const SceneView& view, Diagnostics& diagnostics) {

@@ -111,8 +111,7 @@ inline void declare(Settings& s, RenderRequest& r) {
   s.real("checkpoint", r.checkpoint_seconds, {.low = 0}, "Seconds between saving unfinished films; 0: never");
   r.preview = !s.flag("no-preview", "Do not write the PNG");
   s.real("exposure", r.exposure, {.low = -40, .high = 40}, NumberWord{"auto", kAutomaticExposure},
-         "Stops by which the PNG is brighter than the image; auto: 0 unless a tenth of it is burnt or black",
-         {.level = OptionLevel::kBasic});
+         "Stops by which the PNG is brighter than the image; auto: 0 unless a tenth of it is burnt or black");
   s.flag("aovs", r.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
   s.whole("aov-samples", r.aov_samples, {.low = 1, .high = 65536},
           "Most samples per pixel of albedo, normal and position; fewer are taken where they have little noise");
