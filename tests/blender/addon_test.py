@@ -51,8 +51,8 @@ class Pack(AddonTest):
     def test_one_version(self):
         """That of CMakeLists.txt, for old Blenders and new ones."""
         archive = zipfile.ZipFile(self.pack())
-        self.assertIn('\nversion = "0.1.0"\n', archive.read("covary_addon/blender_manifest.toml").decode())
-        self.assertIn('"version": (0, 1, 0)', archive.read("covary_addon/__init__.py").decode())
+        self.assertIn('\nversion = "0.2.0"\n', archive.read("covary_addon/blender_manifest.toml").decode())
+        self.assertIn('"version": (0, 2, 0)', archive.read("covary_addon/__init__.py").decode())
 
     def test_other_files(self):
         for words in ([], ["a.whl", "b.zip"], ["covary-1.tar.gz", "b.zip"]):
