@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Temporal accumulation: mixes previous frames into a frame where held-out samples show less error for it (ours).
+// Temporal accumulation: mixes previous frames into a frame where held-out samples show less error for it.
 //
 // M: the frame's own mixture, with standard error s; s*: M times the median of s / M over 5 x 5 pixels; H: the history,
 // previous frames reprojected to this one, with samples independent of the frame's. The candidate is
@@ -15,8 +15,10 @@
 // alike: 1 + max(0, 1 - v / d^2) d / r with the difference d of sums, its variance v, and the sum r of the history
 // [JamesStein1961].
 //
-// Clamping to the frame's values is usual in temporal antialiasing [Karis2014]; clamping to a confidence interval and
-// measured weights are ours. [Rousselle2016] uses the previous image as a control variate for re-rendering.
+// Reprojected frames come from [Nehab2007], their accumulation before a filter from [Schied2017]. Temporal antialiasing
+// clamps them to the range or the variance of the frame's neighbouring pixels [Karis2014], [Salvi2016], [Yang2020];
+// here the frame's standard error sets the bounds, and held-out samples the weights. [Rousselle2016] uses the previous
+// image as a control variate for re-rendering.
 //
 // If samples of previous frames are kept, they are denoised again with the new ones. With R_A and R_B, the means of
 // their halves, and Y_A and Y_B, those of the frame's own,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layers of a denoised image (ours): parts of the light, such as direct and indirect light, denoised so that they add
+// Layers of a denoised image: parts of the light, such as direct and indirect light, denoised so that they add
 // up to the picture. Each layer is made as the picture is, with the picture's weights:
 //
 //     L_k = d_k + sum_p x_p (C_p,k - d_k),
@@ -9,7 +9,8 @@
 //
 //     L'_k = L_k + (M - sum_j L_j) |L_k| / sum_j |L_j|,
 //
-// which scales positive layers. Claim: sum_k L'_k = M up to rounding, at every pixel.
+// which scales positive layers. [Zimmer2015] denoise components of the light apart, too. Claim: sum_k L'_k = M up to
+// rounding, at every pixel.
 #pragma once
 
 #include <span>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Clamps fireflies, bright groups of samples that no other group confirms, before a denoiser spreads them: the
-// brightness of independent samples around it limits a group (ours).
+// brightness of independent samples around it limits a group. [DeCoro2010] rejects samples that no
+// neighbour confirms, [Jeffery2020] fireflies that only one half buffer has.
 //
 // Claim: biased towards dark; consistent, because groups of more samples differ less.
 #pragma once

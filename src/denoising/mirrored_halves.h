@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Improves a denoiser's image of all samples by averaging with those of the halves, needed for cross-validation anyway
-// (ours).
+// Improves a denoiser's image of all samples by averaging with those of the halves, needed for cross-validation anyway.
 //
 // A network makes different errors for other samples and for mirror images. With the denoiser D, all samples h, halves
 // h_A and h_B, and reversals M_x of columns and M_y of rows, D(h) is replaced by
 //
 //     D(h) / 2 + (M_x D(M_x h_A) + M_y D(M_y h_B)) / 4.
 //
-// Averaging over mirror images is common in image restoration: Timofte, Rothe, Van Gool, CVPR 2016, "enhanced
-// prediction".
+// Averaging over mirror images is common in image restoration ("enhanced prediction" of [Timofte2016]).
 #pragma once
 
 #include <functional>

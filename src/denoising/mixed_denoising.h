@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Denoising with an error estimate (ours): mixes an estimator's image with images of less noise and more bias
+// Denoising with an error estimate: mixes an estimator's image with images of less noise and more bias
 // (candidates.h), with weights per pixel that have the least error by held-out samples (mixture.h). The estimator uses
 // two passes, or is the mean of a single one.
+//
+// Such mixtures are Ensemble Denoising [Zheng2021], there of denoisers alone; that a denoised image be mixed with its
+// noisy input is in [Back2020], [Firmino2022], [Gu2022]. docs/methods/denoising.md says what differs.
 //
 // Claim: consistent if the estimator is, because the weights of biased candidates vanish as samples reveal the bias.
 // The error, including bias, is measured (held_out_error.h).

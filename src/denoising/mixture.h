@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mixtures of images by cross-validation (ours): held-out samples, which no image was made of, determine each pixel's
-// weights.
+// Mixtures of images by cross-validation: held-out samples, which no image was made of, determine each pixel's weights.
+// Weights of denoisers with x >= 0, sum x <= 1 from two half buffers are Ensemble Denoising [Zheng2021]; filters chosen
+// by half buffers go back to [RKZ2011], [RKZ2012], regressions stacked by cross-validation to [Breiman1996]. Here F,
+// with little bias, is one of the images, and the weights are shrunk.
 //
 // F: an image with little bias, C_p: candidates with less noise and more bias. From one half of the samples, A, the
 // same methods make F_A and C_A,p; the independent image h_B of the other half is unbiased, with errors independent of

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The mixture of images with the least estimated error (ours). Given the noisy mean C_i of a pixel's independent
-// samples, and images X_j that are linear in such means with weights that do not depend on them, o_j being the weight
-// of the pixel itself (filtered images, or an image of other samples with o_j = 0),
+// The mixture of images with the least estimated error, Mallows' C_p [Mallows1973]. Given the noisy mean C_i of a
+// pixel's independent samples, and images X_j that are linear in such means with weights that do not depend on them,
+// o_j being the weight of the pixel itself (filtered images, or an image of other samples with o_j = 0),
 //
 //     G = C_i + sum_j a_j (X_j - C_i)
 //

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light that the CRN image may have missed (ours). All its pixels share their samples, so that whole regions can lack
-// the light of rare paths, or any light; their sample variance is then too small, or zero, and suggests certainty. The
-// independent image knows better: each of its pixels has its own samples. The mean difference of the two images over
-// pixels that look alike in the CRN image,
+// Light that the CRN image may have missed, an addition to [YM2025]. All its pixels share their samples, so that whole
+// regions can lack the light of rare paths, or any light; their sample variance is then too small, or zero, and
+// suggests certainty. The independent image knows better: each of its pixels has its own samples. The mean difference
+// of the two images over pixels that look alike in the CRN image,
 //
 //     D_i = sum_j w_ij (h_j - g_j) / sum_j w_ij,   w_ij = exp(-||g_j - g_i||^2 / (sigma^2(g_i) + tau_i^2)),
 //

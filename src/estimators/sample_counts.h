@@ -7,11 +7,12 @@
 //                 proportional to e = sigma / sqrt(|C|^2 + 0.01). But e comes from few samples, whose errors are common
 //                 to neighbours, and C is dark where sigma is missed: so N is proportional to sqrt(e), with |C| and
 //                 sigma^2 averaged over neighbours, and at least 0.7 and at most twice its mean.
-//   denoised      if the first pass becomes a denoised image: towards its least relMSE per ray (ours). A filter that
+//   denoised      if the first pass becomes a denoised image: towards its least relMSE per ray. A filter that
 //                 averages p and q in the same way has var M_p = d var h_p, where d is also q's part in all errors, so
 //                 that the optimal N is proportional to sqrt(N_1 var M / ((M^2 + 0.01) c)), with N_1 of the first pass
 //                 and the cost c of a sample. The image's squared error, including bias, replaces the variance,
-//                 averaged over 15 x 15 pixels; at least half and at most four times the mean of N.
+//                 averaged over 15 x 15 pixels; at least half and at most four times the mean of N. [Firmino2023] have
+//                 the same aim, with derivatives of the network.
 //   uniform       the same in all pixels; the remainder of the budget is spread, except when rounding to classes: then
 //                 all are equal, and no class is needed.
 //

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Residual correction (ours): restores what an estimator removed, as far as it is common to similar pixels.
+// Residual correction: restores what an estimator removed, as far as it is common to similar pixels. Adding the
+// filtered residual back is twicing [Tukey1977] (boosting of denoisers: [RomanoElad2015]); here the residual is that of
+// an independent image, and F^ guides its filter.
 //
 // Penalties that contain the noise they judge lose energy: bright outliers of the independent image h are penalised
 // more than dark ones. The bias E[h - F^] varies slowly over the image, so that a wide mean of h - F^ over similar

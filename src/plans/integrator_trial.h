@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Chooses the best of several integrators for a render (ours). Each takes a few samples at pixels spread over the
-// window; those that learn are first trained at the same pixels. The best has the least
+// Chooses the best of several integrators for a render. Each takes a few samples at pixels spread over the window;
+// those that learn are first trained at the same pixels. The best has the least
 //
 //     variance of a sample, relative to the brightness as in relMSE, x rays per sample,
 //
-// which is the error at equal work. Counting rays instead of seconds makes the choice independent of the clock. Few
-// samples give only a rough estimate, so another integrator must beat the simplest one clearly, and the largest values,
-// from single bright samples, are clamped. Trials have their own random numbers and are not part of the image; they
-// take about a twentieth of the samples.
+// which is the error at equal work, as [Grittmann2022] choose techniques of one bidirectional integrator. Counting rays
+// instead of seconds makes the choice independent of the clock. Few samples give only a rough estimate, so another
+// integrator must beat the simplest one clearly, and the largest values, from single bright samples, are clamped.
+// Trials have their own random numbers and are not part of the image; they take about a twentieth of the samples.
 #pragma once
 
 #include "plans/render.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plan that determines by a trial whether common random numbers pay off (ours).
+// A plan that determines by a trial whether common random numbers pay off.
 #pragma once
 
 #include <optional>

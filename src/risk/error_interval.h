@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The error of an image and its bounds (ours). The samples give an estimate R with little bias but much noise
+// The error of an image and its bounds. The samples give an estimate R with little bias but much noise
 // (image_risk.h); the variance V between halves is stable but blind to bias. Both, and indicators of rare light, are
 // features of a model fitted to renders of scenes with known truth (benchmarks/error_intervals):
 //
@@ -8,7 +8,7 @@
 // r: the standardised residual, with quantiles from scenes left out of the fit; p: 1, but for mixtures 1 - V / v, which
 // is 0 if they equal the mean h, whose error is V. No interval is given if few pixels or single groups hold most of the
 // noise or light, if the bounds are far apart, or if the image kept fireflies: its error is relative to its own
-// brightness, which hides theirs.
+// brightness, which hides theirs. [Firmino2024] bound the error of each pixel, from estimates of its bias and variance.
 #pragma once
 
 #include <array>

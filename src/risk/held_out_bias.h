@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The bias of an image where it is significant (ours). The same method made M_A and M_B from the two halves of all
-// samples; h_A and h_B are the halves' independent images, whose expectation is correct. The other half decides which
-// pixels are similar, so that the mean
+// The bias of an image where it is significant, by half buffers as in held_out_error.h. The same method made M_A and
+// M_B from the two halves of all samples; h_A and h_B are the halves' independent images, whose expectation is correct.
+// The other half decides which pixels are similar, so that the mean
 //
 //     d_A,i = sum_j w_ij (M_A,j - h_A,j) / sum_j w_ij,   w_ij = exp(-||G_B,j - G_B,i||^2 / ((0.5 G'_B,i)^2 + 1e-4)),
 //

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The error of an image from held-out samples (ours). The same method made M_A and M_B from the two halves of all
-// samples; h_A and h_B are the halves' independent images. Then, on average,
+// The error of an image from held-out samples, the half buffers of [RKZ2011] and [RKZ2012]. The same method made M_A
+// and M_B from the two halves of all samples; h_A and h_B are the halves' independent images. Then, on average,
 //
 //     (M_A - h_B)^2 - var h_B   is the squared error of M_A, bias included,
 //     (M_A - M_B)^2 / 2         is its variance alone.

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The squared error of the written image, without a reference (ours). With the mean h of independent samples, whose
-// variance is v, and any image M made from them,
+// The squared error of the written image, without a reference: Stein's unbiased risk estimate [Stein1981], which
+// [Li2012] brought to rendering. With the mean h of independent samples, whose variance is v, and any image M made from
+// them,
 //
 //     E (M - mu)^2 = E[ (M - h)^2 - v + 2 cov(M, h) ],
 //
-// including bias. The covariance comes from both halves of the samples: for an M that is locally linear in them,
+// including bias. The covariance, there from derivatives of the filter, comes from both halves of the samples: for an M
+// that is locally linear in them,
 //
 //     cov(M, h) = E[ (M_A - M_B) (h_A - h_B) ] / 4,   and likewise   var M = E (M_A - M_B)^2 / 4.
 //

@@ -5,9 +5,9 @@
 //     after each tile, in order            absorb()
 //     after the wave                       update(): solves all cells; table() then serves the next wave
 //
-// Ours: cells by normal as well; a pyramid of ever wider cells, each shrunk towards its parent where it has little
-// data; a test of each cell's coefficients on the vertices of the next wave, which scales the control or switches it
-// off; a memory limit, met by doubling the width of the cells.
+// Beyond the paper: cells by normal as well; a pyramid of ever wider cells, each shrunk towards its parent where it has
+// little data; a test of each cell's coefficients on the vertices of the next wave, which scales the control or
+// switches it off; a memory limit, met by doubling the width of the cells.
 #pragma once
 
 #include <cstdint>

@@ -2,9 +2,9 @@
 // Fits mixtures of von Mises-Fisher lobes to weighted directions: expectation maximisation (EM) with priors, splitting
 // and merging of lobes [Ruppert2020] (Sec. 4 and 5; settings of the Open PGL library).
 //
-// Ours: weights are scaled to sum to the effective number of samples (Σ w)² / Σ w², so that priors prevail if a few
-// samples have all the weight; the concentration is the exact maximum, so that an EM step never lowers the penalised
-// likelihood.
+// Unlike there, weights are scaled to sum to the effective number of samples (Σ w)² / Σ w², so that priors prevail if a
+// few samples have all the weight; the concentration is the exact maximum, so that an EM step never lowers the
+// penalised likelihood.
 #pragma once
 
 #include <cstdint>

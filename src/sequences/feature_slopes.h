@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Local linear regression of a picture on features, here albedo and normal.
+// Local linear regression of a picture on features, here albedo and normal (without weights, unlike [Bitterli2016]).
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reprojects the previous frame to the current one.
+// Reprojects the previous frame to the current one [Nehab2007].
 #pragma once
 
 #include "denoising/history.h"
