@@ -156,7 +156,7 @@ class Results(KeptTest):
             own = result(*command, *(() if option == "--albedo" else (option, "1.exr")))
             converted, as_stored = (result(*command, option, name) for name in ("rec709.exr", "untold.exr"))
             self.assertLess(max(abs(x - y) for x, y in zip(own, converted)), 1e-3 * max(own), option)
-            self.assertGreater(max(abs(x - y) for x, y in zip(own, as_stored)), 1e-2 * max(own), "the test sees colours")
+            self.assertGreater(max(abs(x - y) for x, y in zip(own, as_stored)), 1e-2 * max(own), "colours are seen")
 
 
 class Convert(KeptTest):
