@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A neutral photographic studio (ours): a floor that merges into the background at the horizon, a large key light from
+// A neutral photographic studio: a floor that merges into the background at the horizon, a large key light from
 // the upper left, a weak fill light from the right, and a rim light from behind.
 #pragma once
 
