@@ -16,13 +16,7 @@ constexpr int kMostTexts = 1000;  ///< upper bound on values of a repeatable opt
 
 /// "--cv-grid", "-o,--output".
 std::string names_of(const Option& option) {
-  std::string names;
-  for (const std::string& alias : option.aliases)
-    if (alias.size() == 1) names += "-" + alias + ",";
-  names += "--" + option.name;
-  for (const std::string& alias : option.aliases)
-    if (alias.size() > 1) names += ",--" + alias;
-  return names;
+  return (option.letter.empty() ? "" : "-" + option.letter + ",") + "--" + option.name;
 }
 
 /// What the help shows after the name.

@@ -35,7 +35,7 @@ namespace {
 constexpr double kPreviewSeconds = 0.5;  // between images for a viewer
 
 void print_light_path(const RenderOptions& options, const LoadedScene& scene) {
-  const uint64_t number = *options.replay_light;
+  const uint64_t number = replayed_light_path(options);
   const ReplayedLightPath path = replay_light(scene, make_plan(options), make_request(options, scene), number);
   fmt::print("light path {}, {} rays, {} splats\n", number, path.n_rays, path.splats.size());
   for (const LightSplat& splat : path.splats)
@@ -44,7 +44,7 @@ void print_light_path(const RenderOptions& options, const LoadedScene& scene) {
 }
 
 void print_replay(const RenderOptions& options, const LoadedScene& scene) {
-  if (options.replay_light) return print_light_path(options, scene);
+  if (options.replays_light()) return print_light_path(options, scene);
   const std::vector<SampleAddress> addresses = replayed_samples(options);
   const auto samples = replay(scene, make_plan(options), make_request(options, scene), addresses);
   for (size_t i = 0; i < samples.size(); ++i) {
@@ -151,9 +151,9 @@ void report(const RenderReport& report, const StopFlag& stop) {
             result.samples_per_pixel(), doubt.empty() ? "" : "; that is unreliable: " + doubt));
   if (std::any_of(result.passes.begin(), result.passes.end(), [](const Pass& p) { return p.misses_error; }))
     throw Unfinished(kTargetMissed,
-                     fmt::format("--relative-error was not reached: '{}' has {:.4g} samples per pixel, as many as "
-                                 "--spp, --time and --max-spp allow, and some pixels need more",
-                                 options.request().output, result.samples_per_pixel()));
+                     fmt::format("--until {} was not reached: '{}' has {:.4g} samples per pixel, as many as --spp, "
+                                 "--time and --max-spp allow, and some pixels need more",
+                                 options.values.at("until"), options.request().output, result.samples_per_pixel()));
 }
 
 Outputs files_of(const RenderOptions& options) {
@@ -170,7 +170,7 @@ Outputs files_of(const RenderOptions& options) {
                             "interruption",
                             options.request().output));
   if (std::filesystem::is_directory(options.request().passes))
-    for (const char* name : {"crn", "crn-1", "first-1", "independent", "pilot-1", "light"}) {
+    for (const char* name : {"crn", "first-1", "independent", "pilot-1", "light"}) {
       const std::string path = (std::filesystem::path(options.request().passes) / name).string();
       outputs.writes("--passes", path + ".exr", OutputKind::kFilm);
       outputs.writes("--passes", path + ".json", OutputKind::kText);

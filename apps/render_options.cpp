@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstring>
 #include <filesystem>
 #include <limits>
 
@@ -27,7 +28,6 @@ void check_options(RenderOptions& options) {
   RenderSettings& settings = options.settings;
   if (!options.is_replay() && settings.request.output.empty())
     usage("no output given; use -o OUT.exr (or --replay X,Y,SAMPLE)");
-  if (!options.replay.empty() && options.replay_light) usage("--replay and --replay-light exclude each other");
   const std::string name = settings.estimator;
   const auto given = [&](const char* option) { return options.values.contains(option); };
   const Estimator estimator = estimator_of(options);
@@ -45,18 +45,16 @@ void check_options(RenderOptions& options) {
   if (estimator.adaptive && given("split"))
     usage(fmt::format("--split: the first pass of {} has its own number of samples, --dependent-spp", name));
   if (estimator.adaptive && given("sampling")) usage("--sampling: --adaptive always takes independent random numbers");
-  if (settings.passes.chooses_split && !options.stages.empty())
-    usage("--save-stages: --split auto decides while it renders which stages there are");
-  if (passes != EstimatorPasses::kPair && given("split") && !settings.passes.chooses_split)
+  if (passes != EstimatorPasses::kPair && given("split"))
     usage("--split is an option of estimators with two passes, not of " + name);
   if (passes == EstimatorPasses::kSamples && given("groups"))
     usage(fmt::format("--groups: {} are fitted to the samples of a pixel themselves, not to means of groups", name));
   if (passes == EstimatorPasses::kSamples && given("time"))
     usage(fmt::format(
         "--time: {} are fitted to all samples of a pixel together, so their number must be known; use --spp", name));
-  if (given("until")) {
+  if (settings.request.until > 0) {
     if (!estimator.predicts_error)
-      usage("--until: " + name + " does not estimate its error" + (estimator.adaptive ? "; see --relative-error" : ""));
+      usage("--until: " + name + " does not estimate its error" + (estimator.adaptive ? "; use relative=X" : ""));
     if (passes == EstimatorPasses::kAny && settings.passes.groups.value_or(2) < 2)
       usage("--until needs --groups 2 or more");
   }
@@ -67,20 +65,12 @@ namespace {
 /// Options of the render that some integrators do not use.
 void check_integrator(const RenderOptions& options, const LoadedScene& scene) {
   const std::string& name = options.settings.integrator.empty() ? scene.integrator_type : options.settings.integrator;
-  if (options.replay_light && !integrator_of(scene).light_tracing())
+  if (options.replays_light() && !integrator_of(scene).light_tracing())
     throw Error(ErrorCode::kUsage,
-                fmt::format("--replay-light is an option of integrators that trace light; '{}' does not", name));
-  const auto* tracer = integrator_of(scene).light_tracing();
-  const bool beside_crn = make_plan(options).has_crn_pass;
-  if (tracer && options.of_integrator.contains("light-paths") && !tracer->wants_light_pass(beside_crn))
-    throw Error(ErrorCode::kUsage,
-                fmt::format("--light-paths has no effect {}",
-                            beside_crn ? "beside a pass with common random numbers: no light is traced there without "
-                                         "--light-tracing on"
-                                       : "without light tracing (--light-tracing on)"));
+                fmt::format("--replay light is for integrators that trace light; '{}' does not", name));
   if (options.request().path_lengths && !integrator_of(scene).longest_path())
     throw Error(ErrorCode::kUsage,
-                fmt::format("--path-lengths is an option of --integrator controlled-path, not of {}", name));
+                fmt::format("--layers path-lengths is for --integrator controlled-path, not {}", name));
 }
 
 }  // namespace
@@ -107,6 +97,11 @@ RenderRequest make_request(const RenderOptions& options, const LoadedScene& scen
   if (options.replay.empty() && request.load_training.empty()) take_training(scene, request);
   request.attributes = {{film_key::kVersion, COVARY_VERSION}, {film_key::kCommand, command_line()}};
   return request;
+}
+
+uint64_t replayed_light_path(const RenderOptions& options) {
+  const std::string number = options.replay.substr(std::min(options.replay.size(), std::strlen("light,")));
+  return static_cast<uint64_t>(parse_numbers("--replay", number, ',', 1, "light,PATH, e.g. light,17")[0]);
 }
 
 std::vector<SampleAddress> replayed_samples(const RenderOptions& options) {
@@ -136,10 +131,8 @@ void add_output_options(CLI::App& command, RenderOptions& o) {
   add_value(command, "--display-server", o.display_server, kServerValue,
             "Show the image in a running tev while rendering");
   add_stages_option(command, o.stages);
-  add_value(command, "--replay", o.replay, "X,Y,SAMPLE[,PASS]", "Print one sample of each film instead of rendering");
-  command.add_option("--replay-light", o.replay_light, "Print what one light path adds to the image")
-      ->transform(whole_number(uint64_t{0}, (uint64_t{1} << 40) - 1))
-      ->type_name("NUMBER");
+  add_value(command, "--replay", o.replay, "X,Y,SAMPLE[,PASS]|light,PATH",
+            "Instead of rendering, print one sample of each film, or what a light path adds");
   command.option_defaults()->group(kBasicOptions);
 }
 

@@ -4,7 +4,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,13 +18,13 @@ struct RenderOptions {
   RenderSettings settings;                                        ///< the meaning of `values`, by check_options()
   SequenceSettings sequence;                                      ///< the same of `of_sequence`
   std::vector<std::string> defines;
-  std::optional<uint64_t> replay_light;  ///< number of a light path
   int threads = 0;
   bool quiet = false;
 
   const RenderRequest& request() const { return settings.request; }
   /// One sample or light path is printed instead of rendering.
-  bool is_replay() const { return !replay.empty() || replay_light; }
+  bool is_replay() const { return !replay.empty(); }
+  bool replays_light() const { return replay.starts_with("light"); }
 };
 
 /// The file of this program.
@@ -44,6 +43,8 @@ LoadedScene load(const RenderOptions& options);
 Estimator estimator_of(const RenderOptions& options);
 Plan make_plan(const RenderOptions& options);
 RenderRequest make_request(const RenderOptions& options, const LoadedScene& scene);
+/// The number of the light path of --replay; throws Error(kUsage).
+uint64_t replayed_light_path(const RenderOptions& options);
 /// The sample of --replay: of each film of the plan, or only of the one that --sampling names.
 std::vector<SampleAddress> replayed_samples(const RenderOptions& options);
 

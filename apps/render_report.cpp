@@ -29,9 +29,11 @@ std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSa
   for (const std::string& define : o.defines) words.insert(words.end(), {"-D", define});
   OptionValues given = o.values;
   given.insert(o.of_integrator.begin(), o.of_integrator.end());
-  for (const std::string& word : replay_words(std::move(given), pass, bad)) words.push_back(word);
+  const int frame = o.sequence.is_sequence() ? o.sequence.frames->first : 0;
+  for (const std::string& word : replay_words(std::move(given), pass, bad, SequenceSettings::seed_offset(frame)))
+    words.push_back(word);
   if (o.sequence.is_sequence()) {
-    words.insert(words.end(), {"--frames", std::to_string(o.sequence.frames->first), "--frame-seeds", "same"});
+    words.insert(words.end(), {"--frames", std::to_string(frame)});
     if (!o.sequence.camera_path.empty()) words.insert(words.end(), {"--camera-path", o.sequence.camera_path});
   }
   return shell_text(words);
@@ -75,11 +77,6 @@ nlohmann::ordered_json statistics_of(const Pass& pass) {
   json["samples"] = pass.result.n_samples;
   json["rays"] = pass.result.n_rays;
   json["seconds"] = pass.result.seconds;
-  if (const auto& trial = pass.trial; trial && trial->samples > 0)
-    json["split_trial"] = {{"samples_per_pixel", trial->samples},
-                           {"relmse_independent", trial->independent},
-                           {"relmse_with_crn", trial->with_crn},
-                           {"crn_wins", trial->crn_wins}};
   return json;
 }
 

@@ -38,7 +38,7 @@ void check(const RenderOptions& options) {
     if (given) usage(fmt::format("{} is an option of single images, not of --frames", name));
   const DenoisingChoice& denoising = options.settings.denoising;
   if (options.sequence.history && (!denoising.denoises() || request.splits_layers()))
-    usage("--history is for frames with --denoise, and without --layers and --light-groups");
+    usage("--history is for frames with --denoise, and without --layers");
   for (const auto& [name, path] :
        {std::pair{"-o", request.output}, {"--passes", request.passes}, {"--json", options.json}})
     if (!path.empty() && !is_frame_pattern(path))
@@ -55,10 +55,9 @@ RenderOptions frame_options(const RenderOptions& options, int frame) {
   if (is_frame_pattern(one.scene)) one.scene = frame_name(one.scene, frame);
   for (std::string* path : {&request.output, &request.passes, &one.json})
     if (!path->empty()) *path = frame_name(*path, frame);
-  request.seed = options.sequence.seed_of(request.seed, frame);
+  request.seed += SequenceSettings::seed_offset(frame);
   one.values["seed"] = std::to_string(request.seed);
   one.sequence.frames = FrameRange{frame, frame, 1};
-  one.sequence.seeds = FrameSeeds::kSame;
   return one;
 }
 

@@ -87,7 +87,7 @@ void one_pilot(benchmark::State& state) {
 
 void one_neighbours(benchmark::State& state) {
   const Input& in = input();
-  const NeighbourSearch search(25, 11, true);
+  const NeighbourSearch search(25, 11);
   std::vector<lanes::vint> keys(search.offsets().size());
   std::vector<uint16_t> chosen(search.chosen_size());
   for (auto _ : state)

@@ -23,7 +23,7 @@ from exr_writer import exr  # noqa: E402
 from layers import read_image, read_layers  # noqa: E402
 
 REFERENCE_SEEDS = (1001, 1002)
-#: SequenceSettings::seed_of() of src/sequences: seeds of two frames of one command are that far apart
+#: SequenceSettings::seed_offset() of src/sequences: seeds of two frames of one command are that far apart
 SEEDS_OF_FRAME = 1_000_000
 #: of the row of a method: values of the sequence as multiples of the baseline's, and worst regions
 RATIOS = ["relmse", "temporal", "temporal_flip", "still_relmse"]

@@ -21,7 +21,7 @@ COMMON = ("--rfilter", "box", "--max-depth", "5", "--integrator", "controlled-pa
 METHODS = {"no control": ("--cv", "off"), "as published": ("--cv-paper",),
            "Vévoda": ("--cv-paper", "--cv", "vevoda"), "absolute": ("--cv-paper", "--cv-variance", "absolute")}
 GRIDS = {"grid 16": ("--cv-paper", "--cv-grid", "16"),
-         "grid 256": ("--cv-paper", "--cv-grid", "256", "--cv-memory", "4096")}
+         "grid 256": ("--cv-paper", "--cv-grid", "256")}
 PUBLISHED = {
     "cms-diningroom2": {"as published": 2.20, "Vévoda": 1.35}, "cms-rgbsofa": {"as published": 2.17, "Vévoda": 1.95},
     "cms-bathroom": {"as published": 1.03, "Vévoda": 1.03}, "cms-veachmis": {"as published": 1.78, "Vévoda": 1.09},

@@ -130,8 +130,8 @@ def figure5(scene, folder):
     for error in ("0.6", "0.1", "0.03"):
         for title, method in (("paper", PAPER), ("default", METHOD)):
             name = f"{title}{error}"
-            facts = scene.render(name, *BDPT, *method, "--dependent-spp", 50, "--relative-error", error, "--max-spp",
-                                 20000)
+            facts = scene.render(name, *BDPT, *method, "--dependent-spp", 50, "--until", f"relative={error}",
+                                 "--max-spp", 20000)
             scene.row(f"{error}, {title}: {facts['samples_per_pixel']:.0f} samples", name)
             if title == "paper":
                 panels.append(scene.panel(f"relative error {error}", name))

@@ -30,9 +30,8 @@ def passes_of(estimator: str) -> str | None:
 
 @functools.cache
 def _options_of(estimator: str) -> dict[str, dict[str, Any]]:
-    """The registry's options, by each of their names."""
-    return {name: option for option in _registry().get(estimator, {}).get("options", ())
-            for name in (option["name"], *option["aliases"])}
+    """The registry's options, by name."""
+    return {option["name"]: option for option in _registry().get(estimator, {}).get("options", ())}
 
 
 def _rule_of(option: dict[str, Any]) -> Rule:
@@ -58,7 +57,7 @@ def declared_rules(options: Iterable[dict[str, Any]]) -> dict[str, Rule]:
 
 
 def text_options(options: Mapping[str, OptionValue], estimator: str) -> dict[str, str]:
-    """`exclude_target=True, k=9` as {"exclude-target": "", "k": "9"}; None and False are left out, as defaults. Raises
+    """`paper=True, k=9` as {"paper": "", "k": "9"}; None and False are left out, as defaults. Raises
     TypeError and UsageError for values that are not of the option's type; the registry does so for those out of range
     and for names that it does not know."""
     known = _options_of(estimator)
@@ -88,8 +87,8 @@ def option_texts(values: Mapping[str, Any]) -> dict[str, str]:
 
 @functools.cache
 def _of_passes() -> frozenset[str]:
-    return frozenset(name for estimator in _registry().values() for option in estimator["options"]
-                     if option["of_passes"] for name in (option["name"], *option["aliases"]))
+    return frozenset(option["name"] for estimator in _registry().values() for option in estimator["options"]
+                     if option["of_passes"])
 
 
 def check_no_passes(names: Iterable[str], reason: str) -> None:

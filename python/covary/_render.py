@@ -135,14 +135,15 @@ def _check_together(estimator: str | None, given: Mapping[str, Any]) -> None:
 
     needs(("resume", "overwrite", "checkpoint"), ("output", "passes"), "output or passes")
     needs(("preview",), ("output",), "output")
-    for first, second in (("resume", "overwrite"), ("until", "until_p95")):
+    for first, second in (("resume", "overwrite"), ("until", "until_p95"),
+                          ("until", "until_relative"), ("until_p95", "until_relative")):
         if given[first] and given[second]:
             raise UsageError(f"found {first} and {second}; expected one of them")
     passes = passes_of(estimator or DEFAULT)
     if given["sampling"] is not None and passes not in ("any", None):
         raise UsageError(f"sampling: found {given['sampling']!r} with estimator {estimator!r}, which chooses itself; "
                          "it is an argument of estimator 'none'")
-    if given["split"] not in (None, "auto") and passes not in ("pair", None):
+    if given["split"] is not None and passes not in ("pair", None):
         raise UsageError(f"split: found {given['split']!r} with estimator {estimator!r}; it is an argument of "
                          "estimators with two passes")
 
@@ -162,23 +163,24 @@ _DECLARED = {name: rule for name, rule in declared_rules(_covary.render_options(
 
 @checked(_DECLARED,
          scene=SCENE, spp=optional(SPP), estimator=optional(text), integrator=text, until=optional(real(0, above=True)),
-         until_p95=optional(real(0, above=True)), time=optional(real(0, above=True)), seed=SEED,
+         until_p95=optional(real(0, above=True)), until_relative=optional(real(0, above=True)),
+         time=optional(real(0, above=True)), seed=SEED,
          denoise=optional(DENOISE), oidn=empty_or(path), output=optional(path), passes=optional(path), resume=flag,
          overwrite=flag, checkpoint=optional(real(0)), preview=flag,
          crop=optional(several("(x, y, width, height) in pixels", whole(0, 65535), whole(0, 65535), whole(1, 65536),
                                whole(1, 65536))),
          filter=optional(choice(get_args(Filter))),
-         split=optional(either("(CRN, independent), two numbers above 0, or 'auto'",
-                               several("", real(0, above=True), real(0, above=True)), choice(("auto",)))),
+         split=optional(several("(CRN, independent), two numbers above 0", real(0, above=True), real(0, above=True))),
          films_only=flag, progress=optional(function))
 def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | None = None, *, integrator: str = "",
-           until: float | None = None, until_p95: float | None = None, time: float | None = None, seed: int = 0,
+           until: float | None = None, until_p95: float | None = None, until_relative: float | None = None,
+           time: float | None = None, seed: int = 0,
            denoise: DenoiseMode | None = None, oidn: str | PathLike[str] = "",
            output: str | PathLike[str] | None = None, passes: str | PathLike[str] | None = None, resume: bool = False,
            overwrite: bool = False, checkpoint: float | None = None, preview: bool = False,
            crop: tuple[int, int, int, int] | None = None, filter: Filter | None = None,
-           split: tuple[float, float] | Literal["auto"] | None = None, films_only: bool = False,
-           progress: Progress | None = None, **options: Unpack[RenderOptions]) -> RenderResult:
+           split: tuple[float, float] | None = None, films_only: bool = False, progress: Progress | None = None,
+           **options: Unpack[RenderOptions]) -> RenderResult:
     """Renders a scene, or a scene file, as `covary render` does, to the same bits.
 
     spp: samples per pixel over all passes; by default the scene's, or no limit with `until` or `time`.
@@ -187,7 +189,7 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
         are keywords, too.
     integrator: instead of the scene's.
     until: add samples until the predicted relMSE is this; until_p95: until it is in 95 % of the blocks of 16 x 16
-        pixels.
+        pixels; until_relative: until the relative error of each pixel (3 sigma) is, with `adaptive` or dependent-tests.
     time: seconds for rendering and estimating together.
     denoise, oidn: as for combine(); the guides are rendered. The default is "auto", or "none" if an estimator or
         `sampling` is given.
@@ -195,8 +197,7 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     passes: folder to keep the films in; resume: continue existing films; overwrite: replace them;
         checkpoint: seconds between saving unfinished films, by default 300 with `output` or `passes`; 0: never.
     crop: x, y, width and height in the frame.
-    split: ratio of the samples of the CRN and the independent pass, or "auto", which tries whether common random
-        numbers improve the denoised mean.
+    split: ratio of the samples of the CRN and the independent pass.
     films_only: render the passes only; result.image is then the mean of all samples.
     progress: called with (done, total) samples, up to 20 times a second.
     {declared}
@@ -206,6 +207,7 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     _check_scene_arguments(scene, keywords)
     _check_together(estimator, {"resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "preview": preview,
                                 "output": output, "passes": passes, "until": until, "until_p95": until_p95,
+                                "until_relative": until_relative,
                                 "sampling": keywords.get("sampling"), "split": split})
     declared = {name.replace("_", "-"): keywords.pop(name) for name in _DECLARED if name in keywords}
     texts = text_options(keywords, estimator or DEFAULT)
@@ -214,7 +216,7 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     if checkpoint is None:
         checkpoint = _CHECKPOINT_SECONDS if output is not None or passes is not None else 0
     loading = chosen._loading
-    until_words = {"relmse": until, "relmse-p95": until_p95}
+    until_words = {"relmse": until, "relmse-p95": until_p95, "relative": until_relative}
     values = option_texts({
         "output": output, "spp": spp, "time": time, "seed": seed,
         "until": next((f"{name}={error!r}" for name, error in until_words.items() if error is not None), None),

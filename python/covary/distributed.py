@@ -192,8 +192,6 @@ def _plan(scene: Scene, spp: int, estimator: str | None, seed: int, sample_range
     if unknown := set(settings) - set(_SETTINGS):
         raise UsageError(f"settings: found {min(unknown)!r}; expected one of {', '.join(_SETTINGS)}")
     settings = check_some(render_here, settings, "settings")
-    if settings.get("split") == "auto":
-        raise UsageError("split 'auto' tries out the whole frame, of which a worker has a tile")
     if spp % sample_ranges or seed + sample_ranges > 1 << 64:
         raise UsageError(f"sample_ranges: found {sample_ranges} with {spp} samples and seed {seed}; the ranges divide "
                          "the samples, and each has a seed of its own from `seed` on")

@@ -51,7 +51,6 @@ bool is_adaptive_option(const std::string& name) {
 nb::dict option_dict(const Option& option) {
   nb::dict d;
   d["name"] = option.name;
-  d["aliases"] = option.aliases;
   d["type"] = name_of(option.type);
   d["default"] = option.default_value;
   d["range"] = option.range.text();

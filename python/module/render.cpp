@@ -69,14 +69,6 @@ struct Choice {
   bool films_only = false;       ///< no image is made of the films
 };
 
-/// The settings. Throws Error(kUsage) for values outside the ranges of their options.
-RenderSettings settings_of(const Options& values) {
-  for (const Option& option : options_of<RenderSettings>())
-    if (const auto given = values.find(option.name); given != values.end() && !accepted(option, given->second))
-      throw Error(ErrorCode::kUsage, fmt::format("`{}` {}", option.name, problem_of(option, given->second)));
-  return settings_from<RenderSettings>(values);
-}
-
 Plan plan_of(const RenderSettings& settings, const Choice& choice) {
   if (choice.films_only && settings.request.splits_layers())
     throw Error(ErrorCode::kUsage, "layers: films_only=True makes no image that they would be parts of");
@@ -136,7 +128,7 @@ nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std:
 
 nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Options& of_integrator,
                       nb::object progress) {
-  const RenderSettings settings = settings_of(choice.values);
+  const RenderSettings settings = settings_from<RenderSettings>(choice.values);
   const Plan plan = plan_of(settings, choice);
   RenderRequest request = request_of(settings, scene);
   request.films_only = choice.films_only;
@@ -169,7 +161,7 @@ nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Opti
 /// What render() would make of the films of its passes, in their order, and of the auxiliary images, for renders in
 /// parts; with the same bits as render().
 nb::dict image_of_films(const Options& values, const Options& of_estimator, nb::dict films, nb::dict aovs) {
-  const RenderSettings settings = settings_of(values);
+  const RenderSettings settings = settings_from<RenderSettings>(values);
   const Plan plan = plan_of(settings, {values, of_estimator});
   RenderResult result;
   for (const auto& [name, film] : films) {

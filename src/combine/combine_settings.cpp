@@ -27,12 +27,10 @@ void declare_images(Settings& s, CombineSettings& v) {
           "Image with common random numbers: one EXR with all groups, or one per group; without it, the independent "
           "image is denoised",
           kFile);
-  s.texts("independent", v.independent, "FILE", "Image with independent random numbers, likewise",
-          {.aliases = {"pt"}, .names = OptionNames::kFile});
-  s.text("output", v.output, "FILE", "The result (EXR)", {.aliases = {"o"}, .names = OptionNames::kFile});
+  s.texts("independent", v.independent, "FILE", "Image with independent random numbers, likewise", kFile);
+  s.text("output", v.output, "FILE", "The result (EXR)", {.letter = "o", .names = OptionNames::kFile});
   s.text("crn-layer", v.crn_layer, "LAYER", "Layer of the CRN image if its files have several");
-  s.text("independent-layer", v.independent_layer, "LAYER", "Layer of the independent image if its files have several",
-         {.aliases = {"pt-layer"}});
+  s.text("independent-layer", v.independent_layer, "LAYER", "Layer of the independent image if its files have several");
   s.text(
       "counts", v.counts, "FILE",
       "EXR with the samples per pixel of the independent image over all groups, if they vary and its files do not say",

@@ -335,7 +335,7 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
   if (AdaptiveSampling* adaptive = estimator.adaptive ? &*estimator.adaptive : nullptr) {
     estimator.memory.of_halves_per_group = 3 * sizeof(float);  // both passes in one film
     adaptive->counts.tops_up = true;
-    if (!adaptive->names_allocation) adaptive->counts.allocation = Allocation::kDenoised;
+    adaptive->counts.allocation = Allocation::kDenoised;
   }
   const Run run = is_mean(base) ? run_of_mean(options, with_oidn) : run_of_pair(base, options, with_oidn);
   estimator.apply = [run](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
@@ -365,7 +365,7 @@ void declare(Settings& s, DenoisingChoice& v, bool is_all) {
            "Mix in denoised images where held-out samples prefer them: for the least error (auto), or with less bias",
            {.level = OptionLevel::kBasic});
   s.text("oidn", v.oidn, "off|LIBRARY",
-         std::string(is_all ? "For `denoise`" : "For `denoise` and `cv-surrogate` oidn") +
+         std::string(is_all ? "For `denoise`" : "For `denoise` and `cv-variance` relative-oidn") +
              ": Open Image Denoise's library or its folder; default: searched for; 'off': not used",
          {.names = OptionNames::kLibrary});
   s.only_if(v.denoises() || !is_all, {"oidn"}, kNotDenoised);

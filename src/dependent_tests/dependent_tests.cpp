@@ -155,27 +155,24 @@ DependentTestsOptions DependentTestsOptions::paper() {
   return options;
 }
 
-std::vector<std::string> DependentTestsOptions::validate() const {
-  std::vector<std::string> problems;
-  const auto check_window = [&](const char* name, int value, int least) {
-    if (value < least || value > 63 || value % 2 == 0)
-      problems.push_back(fmt::format("{} is {}, expected an odd number from {} to 63", name, value, least));
-  };
-  if (regions.max_region < 1 || regions.max_region > 63)
-    problems.push_back(fmt::format("max-region is {}, expected 1 to 63", regions.max_region));
-  if (!(regions.min_centre_drop >= 0))
-    problems.push_back(
-        fmt::format("min-centre-drop is {}, expected zero or a positive number", regions.min_centre_drop));
-  check_window("window", window, 3);
-  check_window("sigma-window", smoothing, 1);
-  check_window("measure-window", measure_window, 3);
-  if (guard != 0) check_window("guard-window", guard, 1);
-  return problems;
+namespace {
+
+bool is_odd(int value, int low) {
+  return OptionRange{.low = static_cast<double>(low), .high = 63, .odd = true}.contains(value);
 }
+
+bool in_range(const DependentTestsOptions& o) {
+  return is_odd(o.window, 3) && is_odd(o.smoothing, 1) && is_odd(o.measure_window, 3) &&
+         (o.guard == 0 || is_odd(o.guard, 1)) && o.regions.max_region >= 1 && o.regions.max_region <= 63 &&
+         o.regions.min_centre_drop >= 0;
+}
+
+}  // namespace
 
 EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& independent,
                                 const DependentTestsOptions& options, DependentTestsStages* stages) {
-  std::vector<std::string> problems = options.validate();
+  COVARY_CHECK(in_range(options), "options of dependent-tests are in the ranges that dependent_tests.h states");
+  std::vector<std::string> problems;
   check(crn, independent, problems);
   throw_if_any("dependent-tests", problems);
 
@@ -210,54 +207,29 @@ int dependent_tests_reach(const DependentTestsOptions& options) {
 
 namespace {
 
-/// Rejects options that others make ineffective.
-void check_effects(Settings& p, const DependentTestsOptions& o) {
-  const bool exact = o.filter == DependentFilter::kExact;
-  p.only_if(exact, {"window", "guard"}, "with the published filter (`paper`, `filter` paper)");
-  p.only_if(!exact, {"max-region", "min-centre-drop"},
-            "with `filter` exact: only the published filter (`filter` paper) has regions");
-}
-
-const OptionTraits kPasses{.effect = OptionEffect::kPasses};
-
 /// Declares its own options; those of --adaptive were declared before.
 void declare(Settings& p, DependentTestsOptions& o) {
-  static constexpr std::pair<const char*, DependentFilter> kFilters[] = {{"exact", DependentFilter::kExact},
-                                                                         {"paper", DependentFilter::kPaper}};
-  static constexpr std::pair<const char*, CombinationWeights> kWeights[] = {
-      {"measured", CombinationWeights::kMeasured},
-      {"effective", CombinationWeights::kEffective},
-      {"counts", CombinationWeights::kCounts}};
-  static constexpr std::pair<const char*, int> kGuards[] = {{"on", DependentTestsOptions().guard}, {"off", 0}};
-  p.choice<DependentFilter>("filter", o.filter, kFilters,
-                            "Weights that minimise the error bound, or the published ones", kPasses);
   p.whole("window", o.window, kWindowRange, kWindowHelp);
-  p.whole("sigma-window", o.smoothing, {.low = 1, .high = 63, .odd = true},
-          "Side of the window over which noise is averaged");
-  p.choice<int>("guard", o.guard, kGuards, "Trust the CRN image less where it is too dark");
-  p.whole("max-region", o.regions.max_region, {.low = 1, .high = 63}, "Maximum side of a region of `filter` paper");
+  p.whole("max-region", o.regions.max_region, {.low = 1, .high = 63}, "Maximum side of a region of `paper`");
   p.real("min-centre-drop", o.regions.min_centre_drop, {.low = 0},
          "Regions grow while their centre's weight drops by at least this much");
-  p.choice<CombinationWeights>("weights", o.weights, kWeights,
-                               "Image weights: measured errors, effective samples, samples");
-  check_effects(p, o);
+  const bool exact = o.filter == DependentFilter::kExact;
+  p.only_if(exact, {"window"}, "with `paper`");
+  p.only_if(!exact, {"max-region", "min-centre-drop"}, "without `paper`: only the published filter has regions");
 }
 
 }  // namespace
 
 Estimator make_dependent_tests(Settings& p) {
-  const bool paper = p.flag("paper", "dependent-tests as published: its filter, weights and allocation", kPasses);
+  const bool paper = p.flag("paper", "dependent-tests as published: its filter, weights and allocation",
+                            {.effect = OptionEffect::kPasses});
   DependentTestsOptions o = paper ? DependentTestsOptions::paper() : DependentTestsOptions();
   AdaptiveSampling adaptive;
   if (paper) adaptive.counts.allocation = Allocation::kEqualError, adaptive.counts.min_spp = 0;
   if (paper) adaptive.counts.smoothing = 1;
+  adaptive.counts.classes = paper;
   ask_for(p, adaptive);
   declare(p, o);
-  adaptive.counts.classes = o.filter == DependentFilter::kPaper;
-  std::vector<std::string> problems = o.validate();
-  const std::vector<std::string> of_counts = adaptive.validate();
-  problems.insert(problems.end(), of_counts.begin(), of_counts.end());
-  throw_if_any("dependent-tests", problems);
 
   Estimator estimator;
   estimator.summary = "dependent tests driven filtering";

@@ -6,7 +6,7 @@
 // is chosen from the first image (sample_counts.h). The independent image is filtered over pixels that are similar in
 // the CRN image, with weights that balance noise against distortion; the result is averaged with the CRN image.
 //
-// The defaults extend the paper, each by an option: weights that exactly minimise the error bound over a large window
+// The defaults extend the paper: weights that exactly minimise the error bound over a large window
 // (bound_filter.h), sigma from both passes and averaged over neighbours, a combination by measured errors instead of
 // numbers of samples (least_error_mixture.h), and differences scaled up where the CRN image is darker than the
 // independent one because too few of its samples found the light. DependentTestsOptions::paper() has none of them.
@@ -56,8 +56,6 @@ struct DependentTestsOptions {
 
   /// The published estimator with its published settings.
   static DependentTestsOptions paper();
-  /// Every problem with the options; empty if there is none.
-  std::vector<std::string> validate() const;
 };
 
 /// Intermediate results of dependent_tests(): the images of [Csonka2002] Fig. 2 (`dependent`, `independent`,
@@ -66,7 +64,7 @@ struct DependentTestsOptions {
 using DependentTestsStages = std::map<std::string, Image>;
 
 /// Pixels may have any number of samples in either image; with none in the independent one, the result is that of the
-/// CRN image. `stages`: may be null. Throws Error(kUsage) listing every problem with options and inputs: both images
+/// CRN image. `stages`: may be null. Throws Error(kUsage) listing every problem with the inputs: both images
 /// must have the same size, and the CRN image two groups or the variance of its samples. Bit-identical for any number
 /// of threads.
 EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& independent,

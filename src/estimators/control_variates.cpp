@@ -54,7 +54,7 @@ class Regression {
         T_(input.crn.groups),
         records_(input, settings, valid),
         layout_(records_.layout()),
-        search_(settings.k, settings.window, settings.include_target),
+        search_(settings.k, settings.window),
         radius_(settings.window / 2) {}
 
   void run_tile(const Tile& tile, Workspace& w) const {
@@ -354,11 +354,10 @@ void apply_control_variates(const ControlVariateInput& input, const ControlVaria
   });
 }
 
-void check_k(int k, int window, bool include_target, std::vector<std::string>& problems) {
-  const int64_t candidates = int64_t{window} * window - (include_target ? 0 : 1);
-  if (k < 1 || k > candidates)
-    problems.push_back(fmt::format("k is {}, expected 1 to {}, the number of {}pixels in a window of {} x {}", k,
-                                   candidates, include_target ? "" : "neighbouring ", window, window));
+void check_k(int k, int window, std::vector<std::string>& problems) {
+  if (k < 1 || k > window * window)
+    problems.push_back(fmt::format("k is {}, expected 1 to {}, the number of pixels in a window of {} x {}", k,
+                                   window * window, window, window));
 }
 
 }  // namespace covary

@@ -37,7 +37,6 @@ inline constexpr float kNegligibleRidge = 1e-5f;
 struct ControlVariateSettings {
   int k = 25;
   int window = 11;
-  bool include_target = true;
   /// One coefficient per neighbour shared by R, G and B (rows of X and y stacked, penalties summed), or one per
   /// channel.
   bool shared = true;
@@ -63,14 +62,13 @@ ControlVariateSettings common_settings(const Options& options) {
   ControlVariateSettings settings;
   settings.k = options.k;
   settings.window = options.window;
-  settings.include_target = options.include_target;
   settings.shared = options.shared_coefficients;
   settings.std_error = options.std_error;
   settings.probe = options.probe;
   return settings;
 }
-/// Appends problems with the number k of control variates.
-void check_k(int k, int window, bool include_target, std::vector<std::string>& problems);
+/// Appends problems with the number k of control variates: at most the number of pixels in the window.
+void check_k(int k, int window, std::vector<std::string>& problems);
 
 struct ControlVariateInput {
   GroupedImage crn;
@@ -92,15 +90,11 @@ void apply_control_variates(const ControlVariateInput& input, const ControlVaria
 
 // Options of several estimators, with the same range and help text.
 
-/// The maximum of k is the number of pixels in the window, checked by validate().
+/// The maximum of k is checked by check_k().
 inline constexpr OptionRange kVariatesRange{.low = 1};
 inline constexpr const char* kVariatesHelp = "Number of control variates";
 inline constexpr OptionRange kWindowRange{.low = 3, .high = 63, .odd = true};
 inline constexpr const char* kWindowHelp = "Side of the neighbourhood window";
-inline constexpr const char* kExcludeTargetHelp = "Leave the target out of its own control variates";
-/// Whether channels share their coefficients.
-inline constexpr std::pair<const char*, bool> kCoefficients[] = {{"shared", true}, {"per-channel", false}};
-inline constexpr const char* kCoefficientsHelp = "One coefficient for all channels, or one per channel";
 
 /// Estimator::reliable_samples for Eq. (8) of [YM2025]. Measured on crops of three scenes, 8 to 192 samples per pixel,
 /// 6 seeds (docs/notes/iicv.md): with fewer samples, IICV as published predicts 0.3 to 0.6 of its true squared error.

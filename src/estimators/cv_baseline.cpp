@@ -1,29 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "estimators/cv_baseline.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <optional>
 
+#include "core/error.h"
 #include "estimators/control_variates.h"
 #include "estimators/estimator.h"
 #include "estimators/missing_light.h"
 
 namespace covary {
 
-std::vector<std::string> CvBaselineOptions::validate() const {
-  std::vector<std::string> problems;
-  if (window < 3 || window > 63 || window % 2 == 0)
-    problems.push_back(fmt::format("window is {}, expected an odd number from 3 to 63", window));
-  check_k(k, window, include_target, problems);
-  if (!(ridge >= 0)) problems.push_back(fmt::format("ridge is {}, expected zero or a positive number", ridge));
-  return problems;
-}
-
 EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& independent,
                             const CvBaselineOptions& options) {
-  std::vector<std::string> problems = options.validate();
+  COVARY_CHECK(kWindowRange.contains(options.window) && options.ridge >= 0,
+               "options of cv-baseline are in the ranges that cv_baseline.h states");
+  std::vector<std::string> problems;
+  check_k(options.k, options.window, problems);
   check_inputs(crn, independent, 3, options.std_error ? 2 : 1, problems);
   throw_if_any("cv_baseline", problems);
 
@@ -49,9 +42,9 @@ Estimator make_cv_baseline(Settings& parameters) {
   p.whole("k", o.k, kVariatesRange, kVariatesHelp);
   p.whole("window", o.window, kWindowRange, kWindowHelp);
   p.real("ridge", o.ridge, {.low = 0}, "Ridge relative to the mean diagonal");
-  if (p.flag("exclude-target", kExcludeTargetHelp)) o.include_target = false;
-  p.choice<bool>("coefficients", o.shared_coefficients, kCoefficients, kCoefficientsHelp);
-  throw_if_any("cv-baseline", o.validate());
+  std::vector<std::string> problems;
+  check_k(o.k, o.window, problems);
+  throw_if_any("cv-baseline", problems);
 
   Estimator estimator;
   estimator.summary = "control variates that ignore the errors of the independent image";

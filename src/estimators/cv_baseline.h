@@ -19,8 +19,6 @@ struct CvBaselineOptions {
   int k = 25;
   /// Side of the square window they are chosen from; default 11, odd, 3 … 63 ([YM2025] Sec. 4).
   int window = 11;
-  /// Whether the target pixel is one of its control variates. Default true, as in iicv.
-  bool include_target = true;
   /// Default per channel: with shared coefficients and the target included, the least-squares solution is the target
   /// itself, so that the result is the independent image.
   bool shared_coefficients = false;
@@ -30,11 +28,10 @@ struct CvBaselineOptions {
   /// Also estimate the standard error by Eq. (8), which needs 2 groups in `independent`.
   bool std_error = false;
   PixelProbe* probe = nullptr;  ///< optional; inside the image
-
-  std::vector<std::string> validate() const;
 };
 
-/// Throws Error(kUsage) listing every problem. `crn` needs at least 3 groups.
+/// Throws Error(kUsage) listing every problem with the inputs, or if k does not fit the window. `crn` needs at least 3
+/// groups.
 EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& independent,
                             const CvBaselineOptions& options = {});
 

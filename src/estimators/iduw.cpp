@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "core/error.h"
 #include "core/parallel.h"
 #include "estimators/control_variates.h"
 #include "estimators/estimator.h"
@@ -13,18 +14,6 @@
 namespace covary {
 
 using namespace lanes;
-
-std::vector<std::string> IduwOptions::validate() const {
-  std::vector<std::string> problems;
-  if (window < 3 || window > 63 || window % 2 == 0)
-    problems.push_back(fmt::format("window is {}, expected an odd number from 3 to 63", window));
-  if (samples < 1)
-    problems.push_back(fmt::format("samples is {}, expected the samples per pixel of the CRN image", samples));
-  if (gammas.empty()) problems.push_back("gammas is empty, expected at least one value");
-  for (float gamma : gammas)
-    if (!(gamma > 0)) problems.push_back(fmt::format("a gamma is {}, expected positive numbers", gamma));
-  return problems;
-}
 
 namespace {
 
@@ -157,7 +146,12 @@ class Iduw {
 
 EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& independent, const IduwOptions& options,
                      float* chosen_gamma) {
-  std::vector<std::string> problems = options.validate();
+  COVARY_CHECK(kWindowRange.contains(options.window) && !options.gammas.empty() &&
+                   std::ranges::all_of(options.gammas, [](float gamma) { return gamma > 0; }),
+               "options of iduw are in the ranges that iduw.h states");
+  std::vector<std::string> problems;
+  if (options.samples < 1)
+    problems.push_back(fmt::format("samples is {}, expected the samples per pixel of the CRN image", options.samples));
   check_inputs(crn, independent, 4, 4, problems);
   throw_if_any("iduw", problems);
 
@@ -178,9 +172,7 @@ EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& independent, c
 
 Estimator make_iduw(Settings& parameters) {
   IduwOptions o;
-  o.samples = 1;  // placeholder until the image is known
   parameters.whole("window", o.window, kWindowRange, kWindowHelp);
-  throw_if_any("iduw", o.validate());
 
   Estimator estimator;
   estimator.summary = "input-dependent uncorrelated weighting";

@@ -28,12 +28,11 @@ struct IduwOptions {
   int samples = 0;
   /// Candidates for gamma, all > 0; default the ten of the authors' code.
   std::vector<float> gammas = {0.01f, 0.025f, 0.05f, 0.1f, 0.2f, 0.5f, 1.0f, 1.5f, 2.0f, 2.5f};
-
-  std::vector<std::string> validate() const;
 };
 
-/// Consistent; biased through the weights. Throws Error(kUsage) listing every problem; both images need at least 4
-/// groups (group t belongs to quarter t mod 4 and half t mod 2). `chosen_gamma`, if not null, receives the choice.
+/// Consistent; biased through the weights. Throws Error(kUsage) listing every problem with the inputs; both images need
+/// at least 4 groups (group t belongs to quarter t mod 4 and half t mod 2). `chosen_gamma`, if not null, receives the
+/// choice.
 EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& independent, const IduwOptions& options,
                      float* chosen_gamma = nullptr);
 

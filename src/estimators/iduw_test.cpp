@@ -72,17 +72,15 @@ TEST(Iduw, DegenerateInputs) {
 TEST(Iduw, ReportsEveryProblemAtOnce) {
   const test::Grouped three = test::constant_image(8, 6, 3, 1);
   IduwOptions options;
-  options.window = 2;
-  options.gammas = {0.0f};
   try {
     iduw(three.view(), three.view(), options);
     FAIL() << "no error";
   } catch (const Error& e) {
     EXPECT_STREQ(
         e.what(),
-        "iduw: window is 2, expected an odd number from 3 to 63; samples is 0, expected the samples per pixel of the "
-        "CRN image; a gamma is 0, expected positive numbers; the CRN image has 3 groups, at least 4 are needed (12 "
-        "are recommended); the independent image has 3 groups, at least 4 are needed with these settings");
+        "iduw: samples is 0, expected the samples per pixel of the CRN image; the CRN image has 3 groups, at least 4 "
+        "are needed (12 are recommended); the independent image has 3 groups, at least 4 are needed with these "
+        "settings");
   }
 }
 

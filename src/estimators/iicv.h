@@ -6,7 +6,7 @@
 // serve as control variates of a pixel; their unknown expectations are taken from the independent image, and the
 // coefficients account for its errors.
 //
-// The defaults extend the paper in three ways, each an option: errors common to all CRN pixels cancel
+// The defaults extend the paper in three ways: errors common to all CRN pixels cancel
 // (`mean_constraint`), the penalty contains the expected as well as the realised error of independent pixels
 // (`sample_fraction`), and what the penalty removes is restored (`residual_correction`). IicvOptions::paper() has none
 // of them. With the first, regions where the CRN image misses light fall back to the independent image
@@ -33,6 +33,9 @@ struct Estimator;
 enum class Penalty {
   kPilot,   ///< squared difference from a cross-bilateral pilot, [YM2025] Eq. (11): the paper's choice
   kSample,  ///< sample variance of the groups; the paper's ablation
+  /// As kPilot, but of the neighbour alone, not the mean of the neighbour's and the target's, [YM2025] end of Sec. 4;
+  /// the paper's ablation.
+  kAsymmetric,
 };
 
 struct IicvOptions {
@@ -41,16 +44,9 @@ struct IicvOptions {
   int k = 25;
   /// Side of the square window they are chosen from. Default 11 ([YM2025] Sec. 4; 21 for k = 50, 100); odd, 3 … 63.
   int window = 11;
-  /// Whether the target pixel is one of its own control variates; otherwise its independent value is unused. Default
-  /// true (not specified in the paper; measured).
-  bool include_target = true;
   /// One coefficient per neighbour for all channels (rows stacked) or one per channel. Not specified in the paper.
   bool shared_coefficients = true;
-  /// Penalty from the mean of the neighbour's and the target's error, [YM2025] end of Sec. 4. Default true.
-  bool symmetric = true;
   Penalty penalty = Penalty::kPilot;
-  /// Side of the pilot's window. Default 11 ([YM2025] Eq. (11)); odd, 3 … 63.
-  int pilot_window = 11;
   /// Fraction of the penalty that is the sample variance of h (never symmetric) instead of what `penalty` selects, 0 …
   /// 1. The realised error from a pilot detects outliers but depends on the value it judges; the sample variance is
   /// right on average. Default 0.5 (measured); 0 in the paper.
@@ -69,12 +65,11 @@ struct IicvOptions {
 
   /// The published estimator with its published settings.
   static IicvOptions paper();
-  /// Every problem with the options; empty if there is none.
-  std::vector<std::string> validate() const;
 };
 
-/// Throws Error(kUsage) listing every problem with options and inputs. `crn` needs at least 3 groups, `independent` 2
-/// if its sample variance is used, as by default, and 1 otherwise. Bit-identical for any number of threads.
+/// Throws Error(kUsage) listing every problem with the inputs, or if k does not fit the window. `crn` needs at least 3
+/// groups, `independent` 2 if its sample variance is used, as by default, and 1 otherwise. Bit-identical for any number
+/// of threads.
 EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, const IicvOptions& options = {});
 
 /// Radius of influence of the input on a pixel, in rows or columns. A crop that begins at a row and column that are

@@ -24,28 +24,26 @@ using reference::Rgb, reference::RgbImage;
 using test_support::message_of;
 
 /// Both forms of the system (k below and above the number of rows), shared and per-channel coefficients, symmetric or
-/// not, with and without the target, several numbers of groups.
+/// not, several numbers of groups.
 TEST(Iicv, AgreesWithTheReference) {
   struct Case {
     int k, window, groups;
-    bool include_target, shared, symmetric;
+    bool shared, symmetric;
   };
-  for (const Case& c :
-       {Case{25, 11, 12, true, true, true}, Case{25, 11, 12, true, false, true}, Case{25, 11, 12, false, true, false},
-        Case{6, 7, 12, true, false, false}, Case{40, 11, 12, true, true, true}, Case{50, 21, 4, true, true, true},
-        Case{25, 11, 24, false, false, true}, Case{10, 5, 3, true, true, true}}) {
+  for (const Case& c : {Case{25, 11, 12, true, true}, Case{25, 11, 12, false, true}, Case{25, 11, 12, true, false},
+                        Case{6, 7, 12, false, false}, Case{40, 11, 12, true, true}, Case{50, 21, 4, true, true},
+                        Case{25, 11, 24, false, true}, Case{10, 5, 3, true, true}}) {
     const test::Grouped crn = test::crn_image(41, 27, c.groups, 1),
                         independent = test::independent_image(41, 27, c.groups, 2);
     IicvOptions options = IicvOptions::paper();
     options.k = c.k;
     options.window = c.window;
-    options.include_target = c.include_target;
     options.shared_coefficients = c.shared;
-    options.symmetric = c.symmetric;
+    if (!c.symmetric) options.penalty = Penalty::kAsymmetric;
     options.std_error = true;
     const EstimatorResult fast = iicv(crn.view(), independent.view(), options);
     const RgbImage error = pilot_of(crn.view(), independent.view(), 11);
-    const Difference d = compare(fast, crn.view(), independent.view(), error, c.k, c.window, c.include_target,
+    const Difference d = compare(fast, crn.view(), independent.view(), error, c.k, c.window,
                                  {c.shared, c.symmetric, 0, kSmallestPenalty});
     EXPECT_LT(d.estimate, 2e-3) << "k " << c.k << " shared " << c.shared << " groups " << c.groups;
     EXPECT_LT(d.std_error, 2e-3) << "k " << c.k << " shared " << c.shared << " groups " << c.groups;
@@ -61,10 +59,10 @@ TEST(Iicv, SampleVariancesAsPenaltiesAgreeWithTheReference) {
   options.penalty = Penalty::kSample;
   const RgbImage variance = reference::map_pixels(
       independent_view, [&](int x, int y) { return reference::variance_of_mean(independent_view, x, y); });
-  EXPECT_LT(compare(iicv(crn.view(), independent.view(), options), crn.view(), independent.view(), variance, 25, 11,
-                    true, settings)
-                .estimate,
-            2e-3);
+  EXPECT_LT(
+      compare(iicv(crn.view(), independent.view(), options), crn.view(), independent.view(), variance, 25, 11, settings)
+          .estimate,
+      2e-3);
 }
 
 /// The mean constraint and the mixed penalty.
@@ -79,7 +77,7 @@ TEST(Iicv, ConservationAgreesWithTheReference) {
     options.shared_coefficients = shared;
     options.std_error = true;
     const Difference d = compare(iicv(crn.view(), independent.view(), options), crn.view(), independent.view(), error,
-                                 k, 11, true, {shared, true, 0, kSmallestPenalty, 10, 0.25});
+                                 k, 11, {shared, true, 0, kSmallestPenalty, 10, 0.25});
     EXPECT_LT(d.estimate, 3e-3) << "k " << k << " shared " << shared;
     EXPECT_LT(d.std_error, 3e-3) << "k " << k << " shared " << shared;
   }
@@ -122,7 +120,7 @@ TEST(Iicv, MissingLightAgreesWithTheReference) {
     options.std_error = true;
     const Difference d =
         compare(iicv(in.crn.view(), in.independent.view(), options), in.crn.view(), in.independent.view(), error, k, 11,
-                true, {shared, true, 0, kSmallestPenalty, mean_constraint, 0.5});
+                {shared, true, 0, kSmallestPenalty, mean_constraint, 0.5});
     EXPECT_LT(d.estimate, 3e-3) << "k " << k << " shared " << shared << " mean_constraint " << mean_constraint;
     EXPECT_LT(d.std_error, 3e-3) << "k " << k << " shared " << shared << " mean_constraint " << mean_constraint;
   }
@@ -214,7 +212,7 @@ TEST(Iicv, DefaultsAgreeWithTheReference) {
         independent_view, [&](int x, int y) { return reference::variance_of_mean(independent_view, x, y); });
     const RgbImage error = pilot_of(crn_view, independent_view, 11);
     const RgbImage missing = reference::missing_light(crn_view, independent_view);
-    const auto all = neighbours(crn_view, 25, 11, true);
+    const auto all = neighbours(crn_view, 25, 11);
     RgbImage estimate, std_error;
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x) {
@@ -428,7 +426,7 @@ TEST(Iicv, ImagesSmallerThanTheWindowWork) {
                         independent = test::independent_image(width, height, 5, 4);
     const EstimatorResult fast = iicv(crn.view(), independent.view(), IicvOptions::paper());
     const Difference d = compare(fast, crn.view(), independent.view(), pilot_of(crn.view(), independent.view(), 11), 25,
-                                 11, true, {true, true, 0, kSmallestPenalty});
+                                 11, {true, true, 0, kSmallestPenalty});
     EXPECT_LT(d.estimate, 2e-3) << width << " x " << height;
   }
 }
@@ -437,22 +435,12 @@ TEST(Iicv, ReportsEveryProblemAtOnce) {
   const test::Grouped two = test::constant_image(8, 6, 2, 1), one = test::constant_image(8, 5, 1, 1);
   IicvOptions options = IicvOptions::paper();
   options.k = 200;
-  options.pilot_window = 10;
-  options.sample_fraction = 2;
-  options.mean_constraint = -1;
-  options.residual_options = {4, 0};
   options.penalty = Penalty::kSample;
-  EXPECT_EQ(
-      message_of([&] { iicv(two.view(), one.view(), options); }, ErrorCode::kUsage),
-      "iicv: pilot_window is 10, expected an odd number from 3 to 63; k is 200, expected 1 to 121, the number of "
-      "pixels in a window of 11 x 11; "
-      "sample_fraction is 2, expected a number from 0 to 1; mean_constraint is -1, expected zero or a positive number; "
-      "residual correction: window is 4, expected an odd number from 5 to 125; residual correction: bandwidth is 0, "
-      "expected a positive "
-      "number; "
-      "the CRN image is 8 x 6 and the independent image 8 x 5; "
-      "they must have the same size; the CRN image has 2 groups, at least 3 are needed (12 are recommended); the "
-      "independent image has 1 group, at least 2 are needed with these settings");
+  EXPECT_EQ(message_of([&] { iicv(two.view(), one.view(), options); }, ErrorCode::kUsage),
+            "iicv: k is 200, expected 1 to 121, the number of pixels in a window of 11 x 11; "
+            "the CRN image is 8 x 6 and the independent image 8 x 5; "
+            "they must have the same size; the CRN image has 2 groups, at least 3 are needed (12 are recommended); the "
+            "independent image has 1 group, at least 2 are needed with these settings");
 }
 
 }  // namespace

@@ -70,12 +70,9 @@ Estimator make_none(Settings& parameters) {
   Estimator estimator;
   estimator.name = estimator.text = kMeanName;
   AdaptiveSampling standard;
-  standard.least_min_spp = 1;  // a mean needs a sample
   standard.counts.first_pass_counts = false;
-  std::vector<std::string> problems;
   estimator.adaptive = ask_for_adaptive(
-      p, standard, "A first pass decides how many samples each pixel gets; if denoised, it is averaged in", problems);
-  throw_if_any(kMeanName, problems);
+      p, standard, "A first pass decides how many samples each pixel gets; if denoised, it is averaged in");
   estimator.passes = EstimatorPasses::kAny;
   estimator.summary = "the mean";
   estimator.predicts_error = true;

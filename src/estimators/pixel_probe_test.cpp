@@ -44,7 +44,6 @@ TEST(PixelProbe, ExplainsTheEstimate) {
   options.shared_coefficients = false;
   expect_explained(iicv, options, 25);
   options.k = 9;
-  options.include_target = false;
   expect_explained(iicv, options, 9);
   CvBaselineOptions baseline;
   baseline.ridge = 0.1f;

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "estimators/estimator.h"
 #include "film/grouped_image.h"
@@ -93,14 +92,8 @@ Spectrum polynomials(std::span<const Spectrum> values, std::span<const float> co
   return {static_cast<float>(mean[0]), static_cast<float>(mean[1]), static_cast<float>(mean[2])};
 }
 
-Estimator make_polynomials(Settings& parameters) {
-  PolynomialsOptions o;
-  parameters.whole("dimensions", o.dimensions, {.low = 1, .high = PolynomialsOptions::kMaxDimensions},
-                   "How many of a path's first random numbers the polynomials depend on",
-                   {.effect = OptionEffect::kPasses});
-  o.samples = std::numeric_limits<uint32_t>::max();  // placeholder until the number is known
-  throw_if_any("polynomials", o.validate());
-
+Estimator make_polynomials(Settings&) {
+  const PolynomialsOptions o;
   Estimator estimator;
   estimator.passes = EstimatorPasses::kSamples;
   estimator.summary = "for direct light";

@@ -186,33 +186,17 @@ uint32_t class_of(double samples) {
   return kMost;
 }
 
-std::vector<std::string> CountOptions::validate(uint32_t multiple) const {
-  std::vector<std::string> problems;
-  if (relative_error && !(*relative_error > 0))
-    problems.push_back(fmt::format("relative error is {}, expected a number above 0", *relative_error));
-  if (min_spp < 0) problems.push_back(fmt::format("min-spp is {}, expected 0 or more", min_spp));
-  if (max_spp && *max_spp < 1) problems.push_back(fmt::format("max-spp is {}, expected 1 or more", *max_spp));
-  if (max_spp && *max_spp >= 1 && *max_spp < min_spp)
-    problems.push_back(fmt::format("min-spp is {}, more than max-spp, which is {}", min_spp, *max_spp));
-  if (smoothing < 1 || smoothing > 63 || smoothing % 2 == 0)
-    problems.push_back(
-        fmt::format("the window that smooths variances is {}, expected an odd number from 1 to 63", smoothing));
-  if (!problems.empty() || !max_spp) return problems;
-  const auto most = static_cast<uint32_t>(*max_spp);
-  if (most < multiple)
-    problems.push_back(
-        fmt::format("max-spp is {}, expected at least {}, one sample for each group (`groups`)", most, multiple));
-  else if (most / multiple * multiple < static_cast<uint32_t>(min_spp))
-    problems.push_back(
-        fmt::format("min-spp is {} and max-spp {}, expected a multiple of {}, the number of groups, "
-                    "between them",
-                    min_spp, most, multiple));
-  return problems;
+void CountOptions::check_limits(uint32_t multiple) const {
+  const uint32_t least = std::max(multiple, static_cast<uint32_t>(min_spp));
+  if (max_spp && static_cast<uint32_t>(*max_spp) / multiple * multiple < least)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("`max-spp` is {}, expected at least {}, one sample for each group (`groups`)", *max_spp,
+                            (least + multiple - 1) / multiple * multiple));
 }
 
 std::vector<uint32_t> sample_counts(const GroupedImage& first_pass, double budget, const CountOptions& options,
                                     uint32_t multiple, std::span<const double> filtered) {
-  throw_if_any("numbers of samples", options.validate(multiple));
+  options.check_limits(multiple);
   COVARY_CHECK(multiple >= 1 && budget >= 0 && (std::isfinite(budget) || options.relative_error),
                "counts follow from a budget or a relative error");
   const Demand demand = demand_of(first_pass, options, filtered);
@@ -235,41 +219,18 @@ bool have_relative_error(const GroupedImage& first_pass, const std::vector<uint3
   return std::equal(counts.begin(), counts.end(), wanted.begin(), wanted.end(), std::greater_equal<>());
 }
 
-std::vector<std::string> AdaptiveSampling::validate() const {
-  std::vector<std::string> problems = counts.validate();
-  if (counts.min_spp < least_min_spp && counts.min_spp >= 0)
-    problems.push_back(fmt::format("min-spp is {}, expected {} or more", counts.min_spp, least_min_spp));
-  if (first_spp && *first_spp < 1)
-    problems.push_back(fmt::format("dependent-spp is {}, expected 1 or more", *first_spp));
-  return problems;
-}
-
 void ask_for(Settings& parameters, AdaptiveSampling& sampling) {
-  static constexpr std::pair<const char*, Allocation> kAllocations[] = {{"equal-error", Allocation::kEqualError},
-                                                                        {"least-error", Allocation::kLeastError},
-                                                                        {"uniform", Allocation::kUniform},
-                                                                        {"denoised", Allocation::kDenoised}};
   static constexpr OptionTraits kPasses{.effect = OptionEffect::kPasses};
   Settings& p = parameters;
-  CountOptions& o = sampling.counts;
   p.whole("dependent-spp", sampling.first_spp, {.low = 1},
-          "First pass's samples; default half, at most 50 (iicv: half)",
-          {.aliases = {"pilot-spp"}, .effect = OptionEffect::kPasses});
-  p.choice<Allocation>("allocation", o.allocation, kAllocations, "Distribution of the last pass's samples", kPasses);
-  sampling.names_allocation = p.is_given("allocation");
-  p.real("relative-error", o.relative_error, {.low = 0, .above_low = true},
-         "Target relative error per pixel (3 sigma); `spp` becomes the cap", kPasses);
-  p.whole("min-spp", o.min_spp, {.low = static_cast<double>(sampling.least_min_spp)},
-          "Minimum samples per pixel in the last pass", kPasses);
-  p.whole("max-spp", o.max_spp, {.low = 1}, "Maximum samples per pixel in the last pass", kPasses);
+          "First pass's samples; default half, at most 50 (iicv: half)", kPasses);
+  p.whole("max-spp", sampling.counts.max_spp, {.low = 1}, "Maximum samples per pixel in the last pass", kPasses);
 }
 
 std::optional<AdaptiveSampling> ask_for_adaptive(Settings& parameters, AdaptiveSampling standard,
-                                                 const std::string& help, std::vector<std::string>& problems) {
+                                                 const std::string& help) {
   const bool is_adaptive = parameters.flag("adaptive", help, {.effect = OptionEffect::kPasses});
   ask_for(parameters, standard);
-  const std::vector<std::string> wrong = standard.validate();
-  problems.insert(problems.end(), wrong.begin(), wrong.end());
   if (is_adaptive) return standard;
   parameters.only_if(false, kAdaptiveOptions, "without `adaptive`: all pixels get the same number of samples");
   return {};

@@ -49,8 +49,8 @@ struct CountOptions {
   /// Side of the window over which sigma^2 and, except for kEqualError, |C| are averaged, odd, 1 … 63.
   int smoothing = 7;
 
-  /// Every problem with the options; empty if there is none. Numbers are to be multiples of `multiple`.
-  std::vector<std::string> validate(uint32_t multiple = 1) const;
+  /// Throws Error(kUsage) if no multiple of `multiple` is at most max_spp and at least min_spp.
+  void check_limits(uint32_t multiple) const;
 };
 
 /// Number of samples per pixel, row by row. `budget`: mean samples per pixel, >= 0; infinite for no limit, which
@@ -74,23 +74,18 @@ uint32_t class_of(double samples);
 /// otherwise a pilot, an independent pass that is not part of the image, so that the mean stays unbiased.
 struct AdaptiveSampling {
   CountOptions counts;
-  bool names_allocation = false;  ///< counts.allocation was given explicitly
-  std::optional<int> first_spp;   ///< of the first pass, >= 1; default: half of the budget, at most most_first_spp
+  std::optional<int> first_spp;  ///< of the first pass, >= 1; default: half of the budget, at most most_first_spp
   int most_first_spp = 50;
-  int least_min_spp = 0;      ///< smallest counts.min_spp that the estimator accepts
   bool reads_groups = false;  ///< the estimator needs group means, not only the sample variance
-
-  std::vector<std::string> validate() const;
 };
 
 /// Options that only affect how passes are rendered.
-inline constexpr const char* kAdaptiveOptions[] = {"adaptive",       "dependent-spp", "allocation",
-                                                   "relative-error", "min-spp",       "max-spp"};
+inline constexpr const char* kAdaptiveOptions[] = {"adaptive", "dependent-spp", "max-spp"};
 /// Declares all of these but the first.
 void ask_for(Settings& parameters, AdaptiveSampling& sampling);
 /// Declares all of these, with the defaults `standard` and the help of --adaptive; returns nothing unless that is
-/// given. Appends what is wrong with them to `problems`.
+/// given.
 std::optional<AdaptiveSampling> ask_for_adaptive(Settings& parameters, AdaptiveSampling standard,
-                                                 const std::string& help, std::vector<std::string>& problems);
+                                                 const std::string& help);
 
 }  // namespace covary

@@ -72,7 +72,7 @@ Expected reference_result(const GroupedImage& crn, const GroupedImage& independe
   const RgbImage variance =
       reference::map_pixels(independent, [&](int x, int y) { return reference::variance_of_mean(independent, x, y); });
   const RgbImage error = reference::pilot_of(crn, independent, 11);
-  const auto all = reference::neighbours(crn, 25, 11, true);
+  const auto all = reference::neighbours(crn, 25, 11);
   Expected expected;
   for (int y = 0; y < crn.height; ++y)
     for (int x = 0; x < crn.width; ++x) {

@@ -10,8 +10,7 @@ namespace covary {
 
 using namespace lanes;
 
-NeighbourSearch::NeighbourSearch(int k, int window, bool include_target) : k_(k), offsets_(window_offsets(window)) {
-  if (!include_target) offsets_.erase(offsets_.begin());
+NeighbourSearch::NeighbourSearch(int k, int window) : k_(k), offsets_(window_offsets(window)) {
   COVARY_CHECK(k >= 1 && k <= static_cast<int>(offsets_.size()), "neighbours: k does not fit the window");
   index_mask_ = static_cast<int>(std::bit_ceil(offsets_.size())) - 1;
 }

@@ -14,8 +14,8 @@ class NeighbourSearch {
   static constexpr int kNeighboursAtOnce = 8;
 
  public:
-  /// `k`: at most the number of candidates, which is window^2, or one less without the target itself.
-  NeighbourSearch(int k, int window, bool include_target);
+  /// `k`: at most the number of candidates, window^2.
+  NeighbourSearch(int k, int window);
 
   int k() const { return k_; }
   /// Candidates, from the centre outwards.

@@ -22,12 +22,11 @@ Planes means(const test::Grouped& image, int border) {
   return moments(image.view(), valid, border, kFar).mean;
 }
 
-/// Sizes that are not multiples of the lanes; borders; with and without the target; few and many candidates.
+/// Sizes that are not multiples of the lanes; borders; few and many candidates.
 TEST(Neighbours, AreTheNearestInValue) {
   const test::Grouped image = test::crn_image(37, 21, 4, 5);
-  for (const auto& [k, window, include_target] :
-       {std::tuple{25, 11, true}, {24, 11, false}, {3, 3, true}, {1, 5, false}, {100, 21, true}, {9, 3, true}}) {
-    const NeighbourSearch search(k, window, include_target);
+  for (const auto& [k, window] : {std::pair{25, 11}, {24, 11}, {3, 3}, {1, 5}, {100, 21}, {9, 3}}) {
+    const NeighbourSearch search(k, window);
     const Planes guide = means(image, window / 2);
     Found found(search);
     for (int y = 0; y < image.height; ++y)
@@ -66,7 +65,7 @@ TEST(Neighbours, AreTheNearestInValue) {
 
 TEST(Neighbours, OfEqualValuesAreTheNearestInSpace) {
   const test::Grouped image = test::constant_image(40, 40, 3, 0.7f);
-  const NeighbourSearch search(25, 11, true);
+  const NeighbourSearch search(25, 11);
   const Planes guide = means(image, 5);
   Found found(search);
   search.find(guide, 12, 20, found.keys.data(), found.chosen.data());

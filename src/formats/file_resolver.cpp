@@ -130,6 +130,7 @@ FileView::FileView(const std::string& path) {
   const auto fail = [&](const std::string& reason) {
     throw Error(ErrorCode::kIo, "cannot read '" + path + "': " + reason);
   };
+  if (const std::string pointer = git_lfs_problem(path); !pointer.empty()) throw Error(ErrorCode::kInput, pointer);
   const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (file < 0) fail(std::strerror(errno));
   struct stat status {};

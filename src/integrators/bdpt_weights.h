@@ -3,7 +3,7 @@
 //
 // A path x_0 … x_k, from the light to the lens, is found by techniques (s, t), s + t = k + 1: the light subpath
 // consists of x_0 … x_{s-1}, the camera subpath of the other t vertices. With p_s the density of technique s, the
-// heuristic with exponent b gives it the weight
+// power heuristic, b = 2, gives it the weight
 //     w_s = 1 / sum_i (p_i / p_s)^b = 1 / (1 + sum_{i<s} (p_i / p_s)^b + sum_{i>s} (p_i / p_s)^b).
 // Neighbouring techniques differ in the density of one vertex, so each of the two sums is the product of a sum along
 // one subpath, accumulated while it is traced, and densities at the connection: the quantities dVCM and dVC of
@@ -22,8 +22,6 @@
 #include "scene/emitter.h"
 
 namespace covary {
-
-enum class Heuristic { kPower, kBalance };
 
 /// What the end of a subpath contributes for the techniques in which the other subpath is longer.
 struct SubpathSums {
@@ -67,10 +65,8 @@ inline LightPdfs light_pdfs(const Emitter& emitter, double nee_pmf, double pdf_s
 
 class BidirectionalMis {
  public:
-  explicit BidirectionalMis(Heuristic heuristic) : power_(heuristic == Heuristic::kPower) {}
-
   /// A ratio of densities raised to the heuristic's exponent.
-  double raised(double ratio) const { return power_ ? ratio * ratio : ratio; }
+  static double raised(double ratio) { return ratio * ratio; }
 
   /// The sums after leaving a vertex with sums `at` in a direction with cosine |cos| to its geometric normal.
   SubpathSums leave(const SubpathSums& at, double cosine, const ScatterPdfs& pdfs) const {
@@ -107,9 +103,6 @@ class BidirectionalMis {
     const double hit = light.is_delta ? 0 : raised(pdf * light.cosine / light.direct);
     return hit + others(end, light.emission * cosine / light.direct, reverse);
   }
-
- private:
-  bool power_;
 };
 
 /// Densities of a direction sample; `wo` as passed to sample(). For refraction by a delta lobe, the reverse probability

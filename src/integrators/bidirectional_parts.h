@@ -13,7 +13,6 @@ namespace covary {
 struct BidirectionalSettings {
   PathLengthSettings lengths;
   LightTracingSettings light_tracing;
-  Heuristic heuristic = Heuristic::kPower;
 };
 
 /// The parts of `bdpt`; tests replace them like those of `path` (path_tracer.h).

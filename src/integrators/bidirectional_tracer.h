@@ -53,7 +53,6 @@ class BidirectionalTracer final : public LightTracingIntegrator {
       : LightTracingIntegrator(settings.light_tracing),
         settings_(settings),
         lengths_(settings.lengths),
-        mis_(settings.heuristic),
         parts_(std::move(parts)) {}
 
   std::shared_ptr<Integrator> clone() const override {
@@ -96,10 +95,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
         join_to_lens(scene, paths, paths.first + i, end, splats, context);
   }
 
-  std::string description() const override {
-    return "bdpt " + lengths_.text() +
-           " heuristic=" + (settings_.heuristic == Heuristic::kPower ? "power " : "balance ") + light_tracing_text();
-  }
+  std::string description() const override { return "bdpt " + lengths_.text() + " " + light_tracing_text(); }
 
  private:
   using Path = PathBatch::Path;

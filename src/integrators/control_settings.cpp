@@ -34,14 +34,7 @@ CacheSettings ControlSettings::cache(uint32_t resolution) const {
     settings.resolution = resolution;
   settings.monochrome = kind == ControlKind::kMono;
   settings.by_channel = solves_once();
-  settings.memory_limit = (size_t{memory_mib} << 20) / (controls_indirect() ? 2 : 1);
-  return settings;
-}
-
-CacheSettings ControlSettings::indirect_cache(uint32_t resolution) const {
-  CacheSettings settings = cache(std::max(1u, resolution / 4));
-  settings.prior_samples = 16;
-  settings.by_channel = false;
+  settings.memory_limit = memory_limit();
   return settings;
 }
 

@@ -21,6 +21,13 @@ enum class ControlKind {
   kOptimalMis,
 };
 
+/// The variance that coefficients minimise.
+enum class VarianceKind {
+  kRelative,        ///< relative to the pixels' values [Hua2023] §4.2.1, the first samples denoised by a filter
+  kRelativeByOidn,  ///< the same, denoised by Open Image Denoise
+  kAbsolute,
+};
+
 struct ControlSettings {
   static constexpr uint32_t kAutomaticGrid = 0;
   static constexpr uint32_t kMaxTrainingSpp = 1u << 16;
@@ -30,15 +37,11 @@ struct ControlSettings {
   uint32_t grid = kAutomaticGrid;  ///< cells along the longest side of the scene
   uint32_t train_spp = 16;         ///< samples per pixel to learn from
   uint32_t clusters = 256;         ///< maximum number of light clusters
-  uint32_t memory_mib = 256;       ///< of sums and coefficients while training
-  bool relative = true;            ///< minimise relative variance [Hua2023] §4.2.1, otherwise absolute variance
-  bool oidn = false;               ///< denoise the first samples' pixel values with Open Image Denoise
-  bool prefix = true;              ///< weight samples by the throughput before them [Hua2023] §4.4
-  bool albedo = true;              ///< see by_albedo()
-  bool indirect = false;           ///< see controls_indirect()
-  bool paper = false;              ///< as published, see solves_once() and CacheSettings::published()
+  VarianceKind variance = VarianceKind::kRelative;
+  bool albedo = true;  ///< see by_albedo()
+  bool paper = false;  ///< as published, see solves_once() and CacheSettings::published()
 
-  /// Those of [Hua2023] (Sec. 6.1): light selection by triangle, 8 samples per pixel; 64 cells.
+  /// Those of [Hua2023] (Sec. 6.1): light selection by triangle, 5000 clusters, 8 samples per pixel; 64 cells.
   static ControlSettings published();
 
   bool on() const { return kind != ControlKind::kOff; }
@@ -51,7 +54,7 @@ struct ControlSettings {
   bool ends_selection(uint32_t wave_end) const { return 2 * wave_end >= train_spp && wave_end < train_spp; }
   /// Training samples per pixel that only estimate each pixel's value first, without coefficients.
   uint32_t pilot_spp() const {
-    if (!learns() || !relative || per_pixel()) return 0;
+    if (!learns() || variance == VarianceKind::kAbsolute || per_pixel()) return 0;
     return train_spp >= 4 && !paper ? 2 : std::min(train_spp / 2, 1u);
   }
   /// Whether training uses plain samples and coefficients are solved once after it, as published.
@@ -62,11 +65,13 @@ struct ControlSettings {
   bool has_cells() const { return kind == ControlKind::kRgb || kind == ControlKind::kMono; }
   /// Whether the coefficients of a vertex are multiplied by its albedo: only if they belong to cells.
   bool by_albedo() const { return albedo && has_cells(); }
-  /// Whether light reflected by other surfaces is controlled as well, by bins of directions.
-  bool controls_indirect() const { return indirect && has_cells(); }
+  /// Bytes of sums and coefficients while training, beyond which cells are widened: 256 MiB, or, as the number of cells
+  /// on surfaces grows, up to 4 GiB if a finer grid than 64 is asked for.
+  size_t memory_limit() const {
+    const size_t side = std::clamp(grid, 64u, 256u);
+    return side * side << 16;
+  }
   CacheSettings cache(uint32_t resolution) const;
-  /// For the bins of directions: wider cells, because there are many bins and their light is noisy.
-  CacheSettings indirect_cache(uint32_t resolution) const;
 };
 
 inline constexpr std::pair<const char*, ControlKind> kControlKinds[] = {{"rgb", ControlKind::kRgb},
@@ -80,8 +85,10 @@ inline void declare(Settings& s, ControlSettings& v) {
                                                                            {"shape", LightSelection::kShape},
                                                                            {"power", LightSelection::kPower},
                                                                            {"learned", LightSelection::kLearned}};
-  static constexpr std::pair<const char*, bool> kVariances[] = {{"relative", true}, {"absolute", false}};
-  static constexpr std::pair<const char*, bool> kSurrogates[] = {{"filter", false}, {"oidn", true}};
+  static constexpr std::pair<const char*, VarianceKind> kVariances[] = {
+      {"relative", VarianceKind::kRelative},
+      {"relative-oidn", VarianceKind::kRelativeByOidn},
+      {"absolute", VarianceKind::kAbsolute}};
   s.group("Integrator controlled-path", OptionEffect::kSamples);
   if (s.preset("cv-paper")) v = ControlSettings::published();
   s.choice("cv", v.kind, kControlKinds, "Coefficients: per channel, one, of light samples only, per pixel",
@@ -96,28 +103,13 @@ inline void declare(Settings& s, ControlSettings& v) {
                     "Cells along the scene's longest side; auto: 32 to 256 by pixel size", {.film = "grid={}"});
   s.whole("cv-train", v.train_spp, {.low = 1, .high = ControlSettings::kMaxTrainingSpp},
           "Training samples per pixel, included in `spp`", {.film = "train={}"});
-  s.whole("cv-clusters", v.clusters, {.low = 1, .high = 1 << 30}, "Maximum number of light clusters",
-          {.film = "clusters={}"});
-  s.whole("cv-memory", v.memory_mib, {.low = 1, .high = 1 << 30},
-          "Memory limit of the training in MiB, beyond which cells are widened", {.film = "memory={}"});
-  s.choice("cv-variance", v.relative, kVariances, "Minimise relative or absolute variance", {.film = "variance={}"});
-  // Omitted from the film's settings at its default, which all films from before this option have.
-  s.choice("cv-surrogate", v.oidn, kSurrogates, "How the first samples are denoised: by a filter or Open Image Denoise",
-           {.film = v.oidn ? "surrogate={}" : ""});
-  s.on_off("cv-prefix", v.prefix, "Weight training samples by the path's throughput before the vertex",
-           {.film = "prefix={}"});
-  s.on_off("cv-albedo", v.albedo, "Multiply coefficients by the surface's albedo", {.film = "albedo"});
-  s.on_off("cv-indirect", v.indirect, "Control indirect light, too", {.film = "indirect"});
-  s.only_if(v.learns(),
-            {"cv-paper", "cv-grid", "cv-train", "cv-clusters", "cv-memory", "cv-variance", "cv-surrogate", "cv-prefix"},
+  s.choice("cv-variance", v.variance, kVariances, "Variance to minimise; oidn: pixels denoised by it",
+           {.film = "variance={}"});
+  s.only_if(v.learns(), {"cv-paper", "cv-grid", "cv-train", "cv-variance"},
             "with `cv` off: nothing is learnt (unless `lights` learned)");
   s.only_if(v.lights != LightSelection::kLearned || v.learns_lights(), {"lights"},
             "with `cv-train` " + std::to_string(v.train_spp) + ": no sample is left to learn it from; use 8 or more");
-  s.only_if(v.has_cells(), {"cv-albedo", "cv-indirect"},
-            "with this `cv`: only rgb and mono have coefficients of cells");
-  s.only_if(!v.per_pixel(), {"cv-grid", "cv-variance", "cv-surrogate", "cv-prefix"},
-            "with `cv` optimal-mis: each pixel has its own coefficients");
-  s.only_if(v.relative, {"cv-surrogate"}, "with `cv-variance` absolute: pixel values are not needed");
+  s.only_if(!v.per_pixel(), {"cv-grid", "cv-variance"}, "with `cv` optimal-mis: each pixel has its own coefficients");
 }
 
 }  // namespace covary

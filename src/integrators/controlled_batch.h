@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "integrators/indirect_control.h"
 #include "integrators/light_samples.h"
 #include "integrators/path_batch.h"
 #include "sampling/coefficient_cache.h"
@@ -25,7 +24,7 @@ struct ControlledVertex {
   bool recorded = false;
   uint32_t sums_cell = 0;  ///< of ControlledBatch::sums
   float weight = 0;        ///< of its samples in the sums
-  Spectrum weights;        ///< per channel, if the sums are by channel
+  Spectrum weights;        ///< per channel
   Spectrum plain;          ///< the plain estimate so far, without the throughput, divided by the albedo scale
 };
 
@@ -52,7 +51,6 @@ struct ControlledBatch final : CameraBatch<ControlledPathState, ControlledChoice
     CameraBatch::start(n, 2);
     if (vertices.size() < n) environments.resize(n), vertices.resize(n);
     for (size_t i = 0; i < n; ++i) vertices[i].open = false;
-    indirect.start(n);
   }
 
   std::vector<EmitterSample> environments;
@@ -61,7 +59,6 @@ struct ControlledBatch final : CameraBatch<ControlledPathState, ControlledChoice
 
   bool recording = false;
   SystemSums sums;
-  IndirectRecorder indirect;
   size_t last_cells = 0, last_rows = 0;  ///< of the last tile's sums: the next one is likely to need as much memory
 };
 

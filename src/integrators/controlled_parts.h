@@ -18,7 +18,6 @@ struct ControlledScene {
   std::span<const uint32_t> cluster_of;  ///< cluster of each light
   const Emitter* environment;            ///< sampled separately; or null
   const CoefficientTable* table;         ///< the coefficients; without cells: no control
-  bool prefix = true;                    ///< weight samples by the throughput before them
   /// The control covers light samples only, as if no other technique found their points [Vevoda2018]: r is 1 for each
   /// of them, and direction samples are not part of it.
   bool light_samples_only = false;
@@ -27,8 +26,6 @@ struct ControlledScene {
   bool residuals = false;   ///< while learning, record the residual of each light's samples
   bool by_albedo = false;   ///< multiply coefficients by the albedo of the vertex
   bool monochrome = false;  ///< by the mean albedo over RGB
-  /// Coefficients of the bins of directions, for light reflected by other surfaces; or null: no control of it.
-  const CoefficientTable* indirect = nullptr;
   /// Dense techniques: directions from the BSDF, then the environment.
   static constexpr uint32_t kBsdf = 0, kEnvironment = 1;
   uint32_t n_dense() const { return environment ? 2 : 1; }

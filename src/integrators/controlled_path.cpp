@@ -15,7 +15,7 @@ namespace {
 
 /// What the samples of one tile contribute to training.
 struct SumsRecord final : TrainingRecord {
-  SystemSums sums, indirect;
+  SystemSums sums;
 };
 
 }  // namespace
@@ -30,7 +30,6 @@ void ControlledPath::prepare(const Scene& scene) {
                  {},
                  environment,
                  &table(),
-                 settings_.prefix,
                  settings_.kind == ControlKind::kVevoda,
                  settings_.per_pixel(),
                  settings_.lights == LightSelection::kLearned,
@@ -41,10 +40,6 @@ void ControlledPath::prepare(const Scene& scene) {
   if (settings_.learns())
     cache_ = CoefficientCache(scene.bounds(), expected_samples(clusters_, lights_), controlled_.n_dense(),
                               settings_.cache(resolution()));
-  if (!settings_.controls_indirect()) return;
-  indirect_cache_ =
-      CoefficientCache(scene.bounds(), DirectionBins::counts(), 0, settings_.indirect_cache(resolution()));
-  controlled_.indirect = &indirect_table();
 }
 
 /// With per-pixel coefficients, the longer side of the frame. Otherwise from what the camera sees: cells as wide as 8
@@ -81,48 +76,26 @@ void ControlledPath::select(const std::vector<float>& clusters) {
   lights_.change(weights);
 }
 
-void ControlledPath::use(CoefficientTable table, CoefficientTable indirect) {
+void ControlledPath::use(CoefficientTable table) {
   COVARY_CHECK(scene_ && settings_.on(), "coefficients belong to a scene and to control variates");
   if (!table.selection().empty()) select(table.selection());
   given_ = std::move(table);
   controlled_.table = &*given_;
-  if (!controlled_.indirect) return;
-  given_indirect_ = std::move(indirect);
-  controlled_.indirect = &given_indirect_;
 }
 
-std::string ControlledPath::trained_bytes() const {
-  std::string bytes = table().body();
-  if (!controlled_.indirect) return bytes;
-  std::string both;
-  append_bytes(both, uint64_t{bytes.size()});
-  return both + bytes + indirect_table().body();
-}
+std::string ControlledPath::trained_bytes() const { return table().body(); }
 
 void ControlledPath::use_bytes(std::string_view bytes, const std::string& where) {
-  if (!controlled_.indirect) return use(CoefficientTable::from_body(bytes, where));
-  ByteReader reader(bytes, where);
-  const auto size = reader.read<uint64_t>();
-  reader.check(size <= reader.rest().size());
-  CoefficientTable table = CoefficientTable::from_body(reader.take(size), where);
-  CoefficientTable indirect = CoefficientTable::from_body(reader.rest(), where);
-  reader.check(indirect.n_cells() == 0 || (indirect.n_lights() == DirectionBins::kCount && indirect.n_dense() == 0));
-  use(std::move(table), std::move(indirect));
+  use(CoefficientTable::from_body(bytes, where));
 }
 
-uint64_t ControlledPath::state_hash() const {
-  if (!controlled_.indirect) return table().hash();
-  const uint64_t hashes[] = {table().hash(), indirect_table().hash()};
-  return hash_bytes(std::as_bytes(std::span(hashes)));
-}
+uint64_t ControlledPath::state_hash() const { return table().hash(); }
 
 void ControlledPath::begin_batch(ControlledBatch& batch) const {
   batch.recording = !frozen() && settings_.learns() && trained_spp() >= pilot_spp();
-  batch.indirect.recording = batch.recording && controlled_.indirect;
   if (!batch.recording || batch.sums.n_cells() > 0) return;
   batch.sums = cache_.new_sums();
   batch.sums.reserve(batch.last_cells, batch.last_rows);
-  if (controlled_.indirect) batch.indirect.sums = indirect_cache_.new_sums();
 }
 
 std::unique_ptr<TrainingRecord> ControlledPath::take_record(ThreadState& state) const {
@@ -132,14 +105,11 @@ std::unique_ptr<TrainingRecord> ControlledPath::take_record(ThreadState& state) 
   batch.last_cells = sums.n_cells(), batch.last_rows = sums.n_rows();
   auto record = std::make_unique<SumsRecord>();
   std::swap(record->sums, sums);
-  if (controlled_.indirect) std::swap(record->indirect, batch.indirect.sums);
   return record;
 }
 
 void ControlledPath::absorb(const TrainingRecord& record) {
-  const auto& sums = static_cast<const SumsRecord&>(record);
-  cache_.absorb(sums.sums);
-  if (controlled_.indirect) indirect_cache_.absorb(sums.indirect);
+  cache_.absorb(static_cast<const SumsRecord&>(record).sums);
 }
 
 void ControlledPath::on_restart() {
@@ -147,7 +117,6 @@ void ControlledPath::on_restart() {
   if (selects_by_learning()) lights_ = LightSet(*scene_, settings_.lights);
   if (settings_.learns()) cache_.select(expected_samples(clusters_, lights_));
   cache_.restart();
-  if (controlled_.indirect) indirect_cache_.restart();
 }
 
 void ControlledPath::update() {
@@ -156,7 +125,6 @@ void ControlledPath::update() {
   const uint32_t end = std::min(training_spp(), wave_end(trained_spp(), 1));
   const bool solve = end == training_spp() || !settings_.solves_once();
   if (settings_.on() && solve) cache_.update();
-  if (controlled_.indirect && solve) indirect_cache_.update();
   // Switch to the learnt light selection once half of the samples have been taken: the other half then trains the
   // coefficients for this selection.
   std::vector<float> best;
@@ -186,9 +154,8 @@ IntegratorReport ControlledPath::report() const {
                   used.n_switched_off(), training_spp()),
       {}};
   if (const uint32_t n = cache_.n_coarsened(); n > 0)
-    report.warnings.push_back(
-        fmt::format("{} MiB for control variates (`cv-memory`) were reached; cells are {} times as wide",
-                    settings_.memory_mib, uint64_t{1} << n));
+    report.warnings.push_back(fmt::format("{} MiB for control variates were reached; cells are {} times as wide",
+                                          settings_.memory_limit() >> 20, uint64_t{1} << n));
   if (const uint64_t n = cache_.n_rejected(); n > 0)
     report.warnings.push_back(fmt::format("{} samples of the training were not finite and are left out", n));
   return report;

@@ -27,10 +27,8 @@ class ControlledPath : public LearningIntegrator {
   std::string settings_text() const override;
   /// The coefficients in use.
   const CoefficientTable& table() const { return given_ ? *given_ : cache_.table(); }
-  /// Those of the bins of directions; without cells if they are not learnt.
-  const CoefficientTable& indirect_table() const { return given_ ? given_indirect_ : indirect_cache_.table(); }
   /// Uses previously learnt coefficients instead of training; call after prepare() and before training.
-  void use(CoefficientTable table, CoefficientTable indirect = {});
+  void use(CoefficientTable table);
   const LightSet& lights() const { return lights_; }
 
   void prepare(const Scene& scene) override;
@@ -50,10 +48,8 @@ class ControlledPath : public LearningIntegrator {
   uint32_t training_spp() const override { return given_ ? 0 : settings_.training_spp(); }
   uint32_t pilot_spp() const override { return settings_.pilot_spp(); }
   bool pilot_goes_on() const override { return !settings_.solves_once(); }
-  bool pilot_by_oidn() const override { return settings_.oidn && pilot_spp() > 0; }
-  size_t training_memory() const override {
-    return settings_.learns() ? kSolving * (size_t{settings_.memory_mib} << 20) : 0;
-  }
+  bool pilot_by_oidn() const override { return settings_.variance == VarianceKind::kRelativeByOidn && pilot_spp() > 0; }
+  size_t training_memory() const override { return settings_.learns() ? kSolving * settings_.memory_limit() : 0; }
   std::unique_ptr<TrainingRecord> take_record(ThreadState& state) const override;
   void absorb(const TrainingRecord& record) override;
   bool keeps_training() const override { return settings_.on(); }
@@ -70,8 +66,8 @@ class ControlledPath : public LearningIntegrator {
   void on_restart() override;
   void update() override;
   void on_freeze() override {
-    training_bytes_ = cache_.bytes() + indirect_cache_.bytes();
-    cache_.freeze(), indirect_cache_.freeze();
+    training_bytes_ = cache_.bytes();
+    cache_.freeze();
   }
   uint64_t state_hash() const override;
 
@@ -87,9 +83,7 @@ class ControlledPath : public LearningIntegrator {
   LightClusters clusters_;
   std::shared_ptr<const Emitter> compensated_;  // the environment as sampled, if that is not the scene's own
   CoefficientCache cache_;
-  CoefficientCache indirect_cache_;
   std::optional<CoefficientTable> given_;
-  CoefficientTable given_indirect_;
   ControlledScene controlled_{};
   /// Memory of solving relative to that of sums and coefficients: a sorted copy of both, and the threads' sums; at most
   /// 2.9 times as much was measured.

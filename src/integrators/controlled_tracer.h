@@ -62,7 +62,6 @@ class ControlledTracer {
     start_paths(samples_, batch_);
     context_.by_part.radiance.assign(samples_.size() * context_.by_part.n_parts, Spectrum());
     follow_paths(scene_, lengths_, samples_, batch_, context_, *this);
-    batch_.indirect.finish();
   }
 
   // The steps of follow_paths().
@@ -112,7 +111,7 @@ class ControlledTracer {
     batch_.ended.clear();
   }
 
-  bool scatter(int depth, uint32_t i, const PathVertex& at) {
+  bool scatter(int /*depth*/, uint32_t i, const PathVertex& at) {
     Path& path = batch_.paths[i];
     const SurfaceHit& hit = at.hit;
     const ControlledBatch::LightChoice& choice = batch_.choices[i];
@@ -127,12 +126,9 @@ class ControlledTracer {
     }
 
     const PathRandom& random = at.sample.random;
-    const Vec2 u = random.get_2d(at.address, Event::kDirection);
-    const BsdfSample next = at.bsdf.sample(at.wo, random.get_1d(at.address, Event::kLobe), u);
-    const bool failed = !next.valid() || is_black(next.weight);
-    if (control_.indirect && vertex.open && choice.in_cell && (Parts::kCountFailed || !failed))
-      control_indirect(depth, path, batch_.rays[i], hit, u);
-    if (failed) {
+    const BsdfSample next =
+        at.bsdf.sample(at.wo, random.get_1d(at.address, Event::kLobe), random.get_2d(at.address, Event::kDirection));
+    if (!next.valid() || is_black(next.weight)) {
       if (!vertex.open) return false;
       if (Parts::kCountFailed && !control_.light_samples_only) take(vertex, Spectrum(), kNoLight, 0);
       batch_.ended.push_back(path.sample);
@@ -181,12 +177,8 @@ class ControlledTracer {
   }
 
   /// The cell of a surface hit by a ray, by its normal on the side of the ray.
-  static CellKey cell_of(const CellGrid& grid, const Ray& ray, const SurfaceHit& hit) {
-    return grid.key(hit.p, dot(hit.frame.n, ray.d) < 0 ? hit.frame.n : -hit.frame.n);
-  }
-
   CellKey key_of(const Ray& ray, const SurfaceHit& hit) const {
-    if (!control_.per_pixel) return cell_of(table_.grid(), ray, hit);
+    if (!control_.per_pixel) return table_.grid().key(hit.p, dot(hit.frame.n, ray.d) < 0 ? hit.frame.n : -hit.frame.n);
     const Camera& camera = scene_.camera();
     const Vec2 film = camera.project(hit.p, ray.d);
     const auto pixel = [this](float x, int size) {
@@ -211,44 +203,18 @@ class ControlledTracer {
         begin_control(vertex);
     }
     const bool controlled = vertex.recorded || vertex.cell != CoefficientTable::kNone;
-    vertex.albedo_scale = control_.by_albedo && (controlled || control_.indirect) ? albedo_scale_of(hit) : Spectrum(1);
+    vertex.albedo_scale = control_.by_albedo && controlled ? albedo_scale_of(hit) : Spectrum(1);
     if (!vertex.recorded) return;
-    vertex.weight = weight_of(path, vertex.albedo_scale);
-    if (batch_.sums.layout().by_channel) vertex.weights = weights_of(path, vertex.albedo_scale);
+    vertex.weights = weights_of(path, vertex.albedo_scale);
+    vertex.weight = mean(vertex.weights);
     vertex.sums_cell = batch_.sums.cell(choice.key);
     vertex.plain = Spectrum();
   }
 
-  /// Weights of a vertex's samples in the sums, by channel, and their mean.
+  /// Weights of a vertex's samples in the sums, by channel.
   Spectrum weights_of(const Path& path, const Spectrum& albedo_scale) const {
     const Spectrum importance = context_.importance.empty() ? Spectrum(1) : context_.importance[path.sample];
-    return variance_weights((control_.prefix ? path.throughput : Spectrum(1)) * albedo_scale, importance);
-  }
-  float weight_of(const Path& path, const Spectrum& albedo_scale) const { return mean(weights_of(path, albedo_scale)); }
-
-  /// Control of light arriving via the next surface, indirect_control.h; call before the path's throughput includes the
-  /// direction that `u` sampled.
-  void control_indirect(int depth, const Path& path, const Ray& ray, const SurfaceHit& hit, Vec2 u) {
-    const int edges = depth + 3;
-    if (depth >= IndirectRecorder::kVertices || edges > lengths_.max_depth) return;
-    const CoefficientTable& table = *control_.indirect;
-    const CellKey key = cell_of(table.grid(), ray, hit);
-    const uint32_t cell = table.find(key), bin = DirectionBins::of(u);
-    const Spectrum& albedo_scale = batch_.vertices[path.sample].albedo_scale;
-    Spectrum control(0), fraction(0);
-    if (cell != CoefficientTable::kNone && (batch_.indirect.recording || !is_black(table.scale(cell)))) {
-      control = table.light_sum(cell) - table.light(cell, bin), fraction = table.scale(cell);
-      add(path.sample, edges, path.throughput * albedo_scale * fraction * control);
-    }
-    if (!batch_.indirect.recording) return;
-    batch_.indirect.vertex(path.sample, depth) = {true,
-                                                  cell != CoefficientTable::kNone,
-                                                  batch_.indirect.sums.cell(key),
-                                                  bin,
-                                                  weight_of(path, albedo_scale),
-                                                  path.throughput * albedo_scale,
-                                                  control,
-                                                  fraction};
+    return variance_weights(path.throughput * albedo_scale, importance);
   }
 
   /// The albedo of a surface; never zero, since a black surface can have highlights.
@@ -331,8 +297,6 @@ class ControlledTracer {
   /// Adds a contribution of paths with `edges` edges to the radiance of a sample.
   void add(uint32_t sample, int edges, const Spectrum& value) {
     samples_[sample].radiance += value;
-    if (batch_.indirect.recording) [[unlikely]]
-      batch_.indirect.add(sample, edges, value);
     const auto place = static_cast<size_t>(edges - 1);
     RadianceByPart& by_part = context_.by_part;
     if (place < by_part.n_parts) [[unlikely]]

@@ -142,13 +142,15 @@ class DirectIntegrator final : public Integrator {
 }  // namespace
 
 std::shared_ptr<Integrator> make_direct(Settings& s, const PathLengthSettings& lengths) {
+  static const OptionTraits kOfScene{.level = OptionLevel::kScene};
   DirectSettings v;
   s.group("Direct light", OptionEffect::kSamples);
   s.whole("shading-samples", v.shading_samples, {.low = 1, .high = kMostSamples},
-          "Light samples and BSDF samples per camera sample");
+          "Light samples and BSDF samples per camera sample", kOfScene);
   v.emitter_samples = v.bsdf_samples = v.shading_samples;
-  s.whole("emitter-samples", v.emitter_samples, {.low = 0, .high = kMostSamples}, "Light samples, if different");
-  s.whole("bsdf-samples", v.bsdf_samples, {.low = 0, .high = kMostSamples}, "BSDF samples, if different");
+  s.whole("emitter-samples", v.emitter_samples, {.low = 0, .high = kMostSamples}, "Light samples, if different",
+          kOfScene);
+  s.whole("bsdf-samples", v.bsdf_samples, {.low = 0, .high = kMostSamples}, "BSDF samples, if different", kOfScene);
   if (v.emitter_samples + v.bsdf_samples == 0)
     throw Error(ErrorCode::kInput, "emitter_samples and bsdf_samples are both 0; there must be a sample");
   return std::make_shared<DirectIntegrator>(v, lengths);

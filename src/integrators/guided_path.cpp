@@ -26,10 +26,7 @@ struct SamplesRecord final : TrainingRecord {
 
 GuidingSettings GuideSettings::field() const {
   GuidingSettings settings;
-  settings.fit.n_lobes = static_cast<int>(lobes);
-  settings.fit.max_lobes = std::min(2 * settings.fit.n_lobes, VmfLobes::kMax);
   settings.leaf_samples = leaf_samples;
-  settings.learn_fraction = learns_fraction();
   return settings;
 }
 
@@ -50,8 +47,6 @@ void GuidedPath::prepare(const Scene& scene) {
              compensated_ ? compensated_.get() : scene.environment(),
              &field(),
              settings_.fraction,
-             settings_.learns_fraction(),
-             settings_.roughness,
              &table(),
              {}};
   if (!settings_.controlled() && !settings_.nee) return;
@@ -156,7 +151,7 @@ class Surface {
     bsdf_ = hit.bsdf->bind(hit, wo_.z > 0, TransportMode::kRadiance, arena_);
     guide_.leaf = guided_.field->find(hit.p);
     if (guide_.leaf == GuidingField::kNone) return;
-    guide_.guidable = guidable_fraction(*bsdf_, wo_, guided_.min_roughness);
+    guide_.guidable = guidable_fraction(*bsdf_, wo_, kMinGuidedRoughness);
     guide_.see(guided_, hit, wo_);
     if (guide_.lobes.n > 0 && guided_.table->n_cells() > 0) cell_ = guided_.table->find(control_key(guide_.leaf));
   }

@@ -16,14 +16,15 @@
 
 namespace covary {
 
+/// BSDF lobes of lower roughness are not guided (docs/notes/guiding.md).
+constexpr float kMinGuidedRoughness = 0.3f;
+
 /// Constant while paths are traced.
 struct GuidedScene {
   const LightSet* lights;      ///< sampled at each vertex; null: no light samples
   const Emitter* environment;  ///< as sampled, or null
   const GuidingField* field;
   float fraction;                        ///< of guided directions
-  bool learned_fraction;                 ///< use each leaf's own fraction instead
-  float min_roughness;                   ///< BSDF lobes of lower roughness are not guided
   const CoefficientTable* table;         ///< control-variate coefficients; without cells: no control
   std::span<const uint32_t> cluster_of;  ///< cluster of each light
 };
@@ -78,7 +79,7 @@ struct Guide {
   void see(const GuidedScene& guided, const SurfaceHit& hit, const Vec3& wo) {
     const GuidingLeaf& own = guided.field->leaf(leaf);
     if (guidable == 0 || own.mixture.lobes.n == 0) return;
-    fraction = guidable * (guided.learned_fraction ? own.fraction : guided.fraction);
+    fraction = guidable * guided.fraction;
     own.mixture.see_from(hit.p, lobes);
     lobes.multiply_by_cosine(wo.z > 0 ? hit.frame.n : -hit.frame.n);
   }

@@ -120,7 +120,7 @@ class GuidedTracer {
     path.bsdf_throughput *= next.weight * (direction.pdf_bsdf > 0 ? next.pdf / direction.pdf_bsdf : 1);
     const Vec3 wi = hit.frame.to_world(next.wi);
     lead_on(path, batch_.rays[i], hit, next, wi);
-    if (batch_.recording && !next.is_delta() && guide_.guidable > 0) record(path, arriving, hit.p, wi, direction);
+    if (batch_.recording && !next.is_delta() && guide_.guidable > 0) record(path, arriving, hit.p, wi, next.pdf);
     return true;
   }
 
@@ -193,7 +193,7 @@ class GuidedTracer {
   void make_guide(const SurfaceHit& hit, const Vec3& wo, const BsdfClosure& bsdf, uint32_t i) {
     guide_.fraction = guide_.guidable = 0;
     if (!(hit.bsdf_flags & kSmooth) || (field_.n_leaves() == 0 && !batch_.recording)) return;
-    guide_.guidable = guidable_fraction(bsdf, wo, guided_.min_roughness);
+    guide_.guidable = guidable_fraction(bsdf, wo, kMinGuidedRoughness);
     if (field_.n_leaves() == 0) return;
     guide_.leaf = batch_.paths[i].leaf;
     guide_.see(guided_, hit, wo);
@@ -252,7 +252,7 @@ class GuidedTracer {
   }
 
   /// Records a direction sample of the path.
-  void record(Path& path, const Spectrum& arriving, const Vec3& p, const Vec3& wi, const GuidedDirection& direction) {
+  void record(Path& path, const Spectrum& arriving, const Vec3& p, const Vec3& wi, float pdf) {
     uint32_t& n = batch_.n_steps[path.sample];
     if (n == GuidedBatch::kMaxSteps) return;
     ++n;
@@ -260,12 +260,7 @@ class GuidedTracer {
     GuidedBatch::Step& step = batch_.last_step(path.sample);
     step.throughput = path.throughput;
     step.arriving = arriving, step.on_arrival = samples_[path.sample].radiance;
-    step.sample = {.position = p,
-                   .direction = wi,
-                   .pdf = direction.sample.pdf,
-                   .pdf_bsdf = direction.pdf_bsdf,
-                   .pdf_guide = direction.pdf_guide,
-                   .guidable = guide_.guidable};
+    step.sample = {.position = p, .direction = wi, .pdf = pdf};
   }
 
   /// The vertices' own light samples are complete: contributions from now on arrive along the recorded directions.

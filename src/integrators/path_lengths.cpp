@@ -5,13 +5,15 @@ namespace covary {
 
 void declare(Settings& s, PathLengthSettings& v) {
   constexpr int kMost = 1 << 30;
+  static const OptionTraits kOfScene{.level = OptionLevel::kScene};
   int max_depth = v.max_depth == PathLengthSettings::kUnlimited ? -1 : v.max_depth;
   s.group("Paths", OptionEffect::kSamples);
   s.whole("max-depth", max_depth, {.low = -1, .high = kMost},
           "Maximum path edges: 1 is visible emission, 2 direct light; -1: no limit", {.level = OptionLevel::kBasic});
-  s.whole("min-depth", v.min_depth, {.low = 0, .high = kMost}, "Leave out paths with fewer edges than this");
-  s.whole("rr-depth", v.rr_depth, {.low = 1, .high = kMost}, "Edges after which Russian roulette may end a path");
-  s.on_off("hide-emitters", v.hide_emitters, "Show lights that the camera sees directly as black");
+  s.whole("min-depth", v.min_depth, {.low = 0, .high = kMost}, "Leave out paths with fewer edges than this", kOfScene);
+  s.whole("rr-depth", v.rr_depth, {.low = 1, .high = kMost}, "Edges after which Russian roulette may end a path",
+          kOfScene);
+  s.on_off("hide-emitters", v.hide_emitters, "Show lights that the camera sees directly as black", kOfScene);
   v.max_depth = max_depth < 0 ? PathLengthSettings::kUnlimited : max_depth;
 }
 

@@ -36,7 +36,10 @@ std::vector<Option> options_of_integrator(const std::string& name) {
 std::vector<Option> options_of_integrators() {
   const std::vector<std::string> names = integrator_names();
   std::vector<std::vector<Option>> lists;
-  for (const std::string& name : names) lists.push_back(options_of_integrator(name));
+  for (const std::string& name : names) {
+    lists.push_back(options_of_integrator(name));
+    std::erase_if(lists.back(), [](const Option& option) { return option.level == OptionLevel::kScene; });
+  }
   return merged_options(names, lists);
 }
 

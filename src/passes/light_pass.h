@@ -35,10 +35,6 @@ inline void declare(Settings& s, LightTracingSettings& v) {
   static constexpr std::pair<const char*, LightTracing> kModes[] = {
       {"auto", LightTracing::kAuto}, {"on", LightTracing::kOn}, {"off", LightTracing::kOff}};
   s.choice("light-tracing", v.mode, kModes, "Trace light paths in a separate pass; auto: unless numbers are common");
-  auto paths = static_cast<float>(v.paths_per_sample);
-  s.real("light-paths", paths, {.low = 1e-3, .high = 1e3}, "Light paths per camera sample");
-  v.paths_per_sample = paths;
-  s.only_if(v.mode != LightTracing::kOff, {"light-paths"}, "without light tracing (`light-tracing` off)");
 }
 
 /// PassSettings::pass of light passes starts here, so that they share no numbers with passes of camera samples.

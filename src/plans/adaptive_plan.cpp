@@ -77,10 +77,6 @@ void check_groups(const Method& method, const PlanState& state, uint32_t first) 
                                                first, groups));
 }
 
-void check_counts(const Method& method, const PlanState& state) {
-  throw_if_any(method.name, method.sampling.counts.validate(method.groups_of(state)));
-}
-
 void check_budget(const Method& method, const PlanState& state, uint32_t first) {
   const double budget = whole_budget(method, state);
   const int least = std::max({1, method.sampling.counts.min_spp, static_cast<int>(method.groups_of(state))});
@@ -143,16 +139,6 @@ EstimatorResult mean_of_last(std::span<const Pass> passes, int first_row, int n_
   return mean;
 }
 
-void check_allocation(const CountOptions& options, bool is_denoised) {
-  if (options.allocation == Allocation::kDenoised && !is_denoised)
-    throw Error(ErrorCode::kUsage,
-                "`allocation` denoised is for the mean of independent samples that is denoised (`denoise`)");
-  if (options.relative_error && is_denoised)
-    throw Error(ErrorCode::kUsage,
-                "`relative-error` is that of an image that is not denoised; `until` adds samples until a denoised one "
-                "has a wanted error");
-}
-
 void set_estimate(const Estimator& estimator, Plan& plan) {
   const auto apply = estimator.apply;
   if (estimator.passes == EstimatorPasses::kAny) {
@@ -182,7 +168,10 @@ void set_estimate(const Estimator& estimator, Plan& plan) {
 Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups) {
   const bool is_pair = estimator.passes == EstimatorPasses::kPair;
   const bool is_denoised = estimator.passes == EstimatorPasses::kIndependent;
-  check_allocation(estimator.adaptive->counts, is_denoised);
+  if (estimator.adaptive->counts.relative_error && is_denoised)
+    throw Error(ErrorCode::kUsage,
+                "`until` relative is for an image that is not denoised; relmse adds samples until a denoised one has a "
+                "wanted error");
   const Method method{*estimator.adaptive, estimator.name, groups, estimator.fewest_groups,
                       is_denoised ? DenoisedMean(estimator.apply) : DenoisedMean()};
   Plan plan = plan_of(estimator);
@@ -202,7 +191,7 @@ Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups) {
   first.set_targets = [=](const PlanState& state, std::span<Pass> passes) {
     const uint32_t samples = first_samples(method, state);
     check_groups(method, state, samples);
-    check_counts(method, state);
+    method.sampling.counts.check_limits(method.groups_of(state));
     check_budget(method, state, samples);
     passes[0].settings.spp = samples;
   };

@@ -26,7 +26,6 @@ struct PassChoice {
   Sampling sampling = Sampling::kIndependent;  ///< for estimators whose one pass may be of either kind
   std::optional<int> groups;                   ///< default: as the plans here choose
   std::optional<std::array<double, 2>> split;  ///< default: Estimator::split
-  bool chooses_split = false;                  ///< decided by render_plan() of render_settings.h (split_plan.h)
 };
 
 /// Passes "crn" and "independent" that advance together, and a two-pass estimator. Groups of each: by default

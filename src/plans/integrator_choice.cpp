@@ -13,16 +13,11 @@
 namespace covary {
 namespace {
 
-/// The options by their own names instead of aliases. Throws Error(kUsage) for one that the integrator does not have.
-OptionValues own_options(const std::string& integrator, const OptionValues& options) {
+/// Throws Error(kUsage) for an option that the integrator does not have.
+void check_options(const std::string& integrator, const OptionValues& options) {
   const std::vector<Option> own = options_of_integrator(integrator);
-  OptionValues values;
-  for (const auto& [name, value] : options) {
-    const Option* option = find_option(own, name);
-    if (!option) refuse_option("integrator", integrator, own, name, integrators_with_option(name));
-    values[option->name] = value;
-  }
-  return values;
+  for (const auto& [name, value] : options)
+    if (!find_option(own, name)) refuse_option("integrator", integrator, own, name, integrators_with_option(name));
 }
 
 /// Mitsuba also accepts depths without any paths. Such images are black, which is rarely intended.
@@ -51,9 +46,9 @@ std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const 
       parameters.error(unknown_integrator(name));
       return nullptr;
     }
-    const OptionValues options = own_options(name, choice.options);
+    check_options(name, choice.options);
     if (name != of_scene && find_integrator(of_scene)) ignore_properties(parameters, options_of_integrator(of_scene));
-    PropertySource source(parameters, options);
+    PropertySource source(parameters, choice.options);
     Settings settings(source);
     auto integrator = make_integrator(*plugin, settings);
     warn_of_black(parameters, settings);

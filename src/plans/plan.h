@@ -46,14 +46,6 @@ struct PassPlan {
   std::string id() const { return number == 0 ? name : name + "-" + std::to_string(number); }
 };
 
-/// Result of a trial of common random numbers (split_plan.h): relMSE of denoised images with equal numbers of samples,
-/// estimated from held-out samples; may be negative.
-struct SplitTrial {
-  double samples = 0;  ///< per pixel, of both passes; 0: there was no trial
-  double independent = 0, with_crn = 0;
-  bool crn_wins = false;
-};
-
 /// A pass during a render.
 struct Pass {
   PassPlan plan;
@@ -67,9 +59,8 @@ struct Pass {
   /// For a light pass: the number of samples that matches the camera's; it may exceed what a film can hold if only a
   /// time limit ends the render.
   double wanted = 0;
-  bool misses_error = false;        ///< the plan needs more samples for its target error than it may take
-  std::optional<SplitTrial> trial;  ///< of split_plan.h: the basis of its decision
-  PassResult result;                ///< accumulated over all calls, earlier ones included if a folder keeps the passes
+  bool misses_error = false;  ///< the plan needs more samples for its target error than it may take
+  PassResult result;          ///< accumulated over all calls, earlier ones included if a folder keeps the passes
 };
 
 /// State available to phases.

@@ -20,10 +20,12 @@ void check_light_groups(const LoadedScene& scene) {
   constexpr size_t kMost = 32;
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   const std::vector<std::string> groups = light_groups(*scene.scene);
-  if (groups.empty()) usage("`light-groups`: no light of the scene has an id, by which it belongs to a group");
+  if (groups.empty()) usage("`layers` light-groups: no light of the scene has an id, by which it belongs to a group");
   if (groups.size() > kMost)
-    usage(fmt::format("`light-groups`: the lights have {} ids; at most {} are distinguished", groups.size(), kMost));
-  if (!integrator_of(scene).by_light(groups)) usage("`light-groups` need an integrator that separates lights: path");
+    usage(fmt::format("`layers` light-groups: the lights have {} ids; at most {} are distinguished", groups.size(),
+                      kMost));
+  if (!integrator_of(scene).by_light(groups))
+    usage("`layers` light-groups needs an integrator that separates lights: path");
 }
 
 void check(const LoadedScene& scene, const Plan& plan, const RenderRequest& request) {
@@ -36,13 +38,10 @@ void check(const LoadedScene& scene, const Plan& plan, const RenderRequest& requ
   if (request.path_lengths && !integrator_of(scene).longest_path())
     usage("an image for each path length needs an integrator that supports it, such as controlled-path");
   if (request.splits_layers() && !plan.estimator->splits_layers)
-    usage(fmt::format("{} makes no `{}`; `estimator` none does, denoised or not", plan.estimator->name,
-                      request.layers ? "layers" : "light-groups"));
-  if (request.layers && request.light_groups)
-    usage("`layers` and `light-groups`: either of them adds up to the image; give one");
+    usage(plan.estimator->name + " makes no `layers`; `estimator` none does, denoised or not");
   if (request.light_groups) check_light_groups(scene);
   if (request.layers && !integrator_of(scene).of_direct_light())
-    usage("`layers` need an integrator that separates direct from indirect light: path");
+    usage("`layers` direct needs an integrator that separates direct from indirect light: path");
   if (request.until > 0 && (request.films_only || !plan.estimator->predicts_error))
     usage((request.films_only ? "a render of films alone" : plan.estimator->name) + " does not estimate its error");
 }

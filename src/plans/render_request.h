@@ -32,8 +32,10 @@ struct RenderRequest {
   double seconds = 0;            ///< > 0: limit for everything but loading
   double until = 0;              ///< > 0: add samples until the predicted relMSE is this small
   bool until_in_blocks = false;  ///< `until` means predicted_blocks() of predicted_error.h, not the whole image
-  bool films_only = false;       ///< only the passes: no image is made of their films
-  bool aovs = false;             ///< also the images Albedo, N and P
+  /// Wanted relative error of each pixel (3 sigma), for estimators with adaptive sample counts; `spp` is then the most.
+  std::optional<float> relative_error;
+  bool films_only = false;  ///< only the passes: no image is made of their films
+  bool aovs = false;        ///< also the images Albedo, N and P
   /// At most, per pixel of the auxiliary images (integrators/aov.h), at least 1. Fewer with `seconds`, if need be.
   uint32_t aov_samples = 64;
   /// Also the images Edges01, Edges02, … of the last pass of camera samples (passes/sample_parts.h). Requires the
@@ -77,12 +79,12 @@ FilterSettings filter_named(const std::string& name);
 inline void declare_goal(Settings& s, RenderRequest& r) {
   s.group("Rendering");
   s.text("output", r.output, "FILE", "The image (EXR); a PNG preview appears beside it",
-         {.aliases = {"o"}, .level = OptionLevel::kBasic, .names = OptionNames::kFile});
+         {.letter = "o", .level = OptionLevel::kBasic, .names = OptionNames::kFile});
   s.whole("spp", r.spp, {.low = 1, .high = kMostSamples}, "Samples per pixel over all passes; default: the scene's",
           kBasicPasses);
   s.text_as("until", r, "relmse=X", read_until,
-            "relmse=X: add samples until the predicted error is X, up to `spp`; relmse-p95=X: until it is in 95 % of "
-            "the blocks of 16 x 16 pixels",
+            "Add samples, up to `spp`, until the predicted error is X; relmse-p95=X: in 95 % of the blocks of 16 x 16 "
+            "pixels; relative=X: until 3 sigma of each pixel are that part of it (adaptive counts)",
             kBasicPasses);
   std::optional<double> seconds;
   s.real("time", seconds, {.low = 0, .above_low = true},
@@ -95,7 +97,7 @@ inline void declare(Settings& s, RenderRequest& r) {
   s.whole("seed", r.seed, {.low = 0}, "Seed of the random numbers", kBasicSamples);
   s.text_as("crop", r.crop, "X,Y,WIDTH,HEIGHT", read_crop, "Render only these pixels of the frame", kBasicSamples);
   s.text("passes", r.passes, "FOLDER", "Folder to keep the film of every pass in",
-         {.aliases = {"save-passes"}, .level = OptionLevel::kBasic, .names = OptionNames::kFolder});
+         {.level = OptionLevel::kBasic, .names = OptionNames::kFolder});
   s.flag("resume", r.resume, "Continue an interrupted render, or the films in `passes`",
          {.level = OptionLevel::kBasic});
   s.group("Sampling", OptionEffect::kSamples);
@@ -115,11 +117,12 @@ inline void declare(Settings& s, RenderRequest& r) {
   s.flag("aovs", r.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
   s.whole("aov-samples", r.aov_samples, {.low = 1, .high = 65536},
           "Most samples per pixel of albedo, normal and position; fewer are taken where they have little noise");
-  s.flag("layers", r.layers, "Add the layers Direct and Indirect, which add up to the image, denoised or not");
-  s.flag("light-groups", r.light_groups,
-         "Add a layer Combined_ID for the lights of each id, and Rest for the others, likewise");
-  s.flag("path-lengths", r.path_lengths, "Add an image for each path length in edges (Edges01, …)",
-         {.effect = OptionEffect::kPasses});
+  std::string layers;
+  s.one_of("layers", layers, {"direct", "light-groups", "path-lengths"},
+           "Add layers that add up to the image, denoised or not: Direct and Indirect; Combined_ID for the lights of "
+           "each id, and Rest for the others; or, of samples, one for each path length in edges (Edges01, …)",
+           {.effect = OptionEffect::kPasses});
+  r.layers = layers == "direct", r.light_groups = layers == "light-groups", r.path_lengths = layers == "path-lengths";
   s.group("Training of controlled-path and guided-path");
   s.text("save-training", r.save_training, "FILE", "Save the training", {.names = OptionNames::kFile});
   s.text("load-training", r.load_training, "FILE", "Use a saved training",

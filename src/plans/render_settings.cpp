@@ -12,7 +12,6 @@
 #include "passes/light_pass.h"
 #include "passes/training.h"
 #include "plans/integrator_choice.h"
-#include "plans/split_plan.h"
 
 namespace covary {
 namespace {
@@ -28,10 +27,8 @@ std::string read_resolution(const std::string& text, RenderSettings& v) {
 }
 
 std::string read_split(const std::string& text, PassChoice& passes) {
-  passes.chooses_split = text == "auto";
-  if (passes.chooses_split) return "";
   const auto parts = parse_reals(text, ':', 2);
-  if (!parts || (*parts)[0] <= 0 || (*parts)[1] <= 0) return "auto or CRN:INDEPENDENT, two numbers above 0, e.g. 1:1";
+  if (!parts || (*parts)[0] <= 0 || (*parts)[1] <= 0) return "CRN:INDEPENDENT, two numbers above 0, e.g. 1:1";
   const double sum = (*parts)[0] + (*parts)[1];
   passes.split = {(*parts)[0] / sum, (*parts)[1] / sum};
   return "";
@@ -44,9 +41,8 @@ void declare_passes(Settings& s, PassChoice& v) {
   s.choice("sampling", v.sampling, kSamplings,
            "Random numbers of a single pass (`estimator` none): independent, or common to all pixels",
            {.effect = OptionEffect::kSamples});
-  s.text_as("split", v, "auto|CRN:INDEPENDENT", read_split,
-            "Ratio of the samples of the two passes; default: the estimator's, usually 1:1. auto (denoised mean): a "
-            "fourth with common random numbers if a trial prefers that");
+  s.text_as("split", v, "CRN:INDEPENDENT", read_split,
+            "Ratio of the samples of the two passes; default: the estimator's, usually 1:1");
   s.whole("groups", v.groups, {.low = 1, .high = Film::kMaxGroups},
           "Groups of samples per pixel, whose means films keep; default: the largest number from 12 to 8 that divides "
           "the samples, else 12 or the number of samples; 1 for a single independent pass");
@@ -64,14 +60,17 @@ std::string read_crop(const std::string& text, std::optional<CropWindow>& crop) 
 }
 
 std::string read_until(const std::string& text, RenderRequest& v) {
-  for (const std::string key : {"relmse=", "relmse-p95="})
+  for (const std::string key : {"relmse=", "relmse-p95=", "relative="})
     if (text.starts_with(key)) {
       const std::optional<double> value = parse_real(std::string_view(text).substr(key.size()));
       if (!value || *value <= 0) break;
-      v.until = *value, v.until_in_blocks = key != "relmse=";
+      if (key == "relative=")
+        v.relative_error = static_cast<float>(*value);
+      else
+        v.until = *value, v.until_in_blocks = key != "relmse=";
       return "";
     }
-  return "relmse=X or relmse-p95=X with X > 0, e.g. relmse=0.005";
+  return "relmse=X, relmse-p95=X or relative=X with X > 0, e.g. relmse=0.005";
 }
 
 FilterSettings filter_named(const std::string& name) {
@@ -98,17 +97,18 @@ void declare(Settings& s, RenderSettings& v) {
 }
 
 Estimator estimator_of(const RenderSettings& settings, const OptionValues& of_estimator) {
-  return with_denoising(make_estimator(settings.estimator, of_estimator), settings.denoising);
+  Estimator estimator = with_denoising(make_estimator(settings.estimator, of_estimator), settings.denoising);
+  if (!settings.request.relative_error) return estimator;
+  if (!estimator.adaptive)
+    throw Error(ErrorCode::kUsage,
+                "`until` relative needs adaptive sample counts: `adaptive`, or `estimator` "
+                "dependent-tests");
+  estimator.adaptive->counts.relative_error = settings.request.relative_error;
+  return estimator;
 }
 
 Plan render_plan(const RenderSettings& settings, const OptionValues& of_estimator) {
-  const Estimator estimator = estimator_of(settings, of_estimator);
-  if (!settings.passes.chooses_split) return estimator_plan(estimator, settings.passes);
-  if (estimator.passes != EstimatorPasses::kIndependent || estimator.adaptive)
-    throw Error(ErrorCode::kUsage,
-                "`split` auto is for the mean of independent samples that is denoised (`denoise`), "
-                "without `adaptive`");
-  return split_plan(estimator, with_denoising(make_estimator(kIicv, {}), settings.denoising), settings.passes.groups);
+  return estimator_plan(estimator_of(settings, of_estimator), settings.passes);
 }
 
 RenderRequest request_of(const RenderSettings& settings, const LoadedScene& scene) {
@@ -117,10 +117,10 @@ RenderRequest request_of(const RenderSettings& settings, const LoadedScene& scen
   const std::string& oidn = settings.denoising.oidn;
   const bool is_surrogate = learning && learning->pilot_by_oidn() && request.load_training.empty();
   if (is_surrogate && oidn == "off")
-    throw Error(ErrorCode::kUsage, "`cv-surrogate` oidn needs Open Image Denoise, which `oidn` off leaves out");
+    throw Error(ErrorCode::kUsage, "`cv-variance` relative-oidn needs Open Image Denoise, which `oidn` off leaves out");
   if (!oidn.empty() && !is_surrogate && !settings.denoising.denoises())
     throw Error(ErrorCode::kUsage,
-                fmt::format("`oidn` has no effect {}, and no training with `cv-surrogate` oidn", kNotDenoised));
+                fmt::format("`oidn` has no effect {}, and no training with `cv-variance` relative-oidn", kNotDenoised));
   if (is_surrogate) request.oidn = oidn;
   return request;
 }
@@ -139,13 +139,14 @@ void take_training(const LoadedScene& scene, RenderRequest& request) {
   request.spp = all - training;
 }
 
-std::vector<std::string> replay_words(OptionValues values, const Pass& pass, const BadSample& bad) {
+std::vector<std::string> replay_words(OptionValues values, const Pass& pass, const BadSample& bad,
+                                      uint64_t seed_offset) {
   std::vector<Option> options = options_of<RenderSettings>();
   const LearningIntegrator* learning = pass.integrator->learning();
   const bool is_by_oidn = learning && learning->pilot_by_oidn() && !values.contains("load-training");
   for (const Option& option : options)
     if (option.effect != OptionEffect::kSamples && !(option.name == "oidn" && is_by_oidn)) values.erase(option.name);
-  values["seed"] = std::to_string(pass.settings.seed);
+  values["seed"] = std::to_string(pass.settings.seed - seed_offset);
   if (values.contains("integrator")) values["integrator"] = registered_name(*pass.integrator);  // the one chosen
   const bool is_crn = pass.settings.sampling == Sampling::kCrn, is_sobol = pass.settings.sampler == Sampler::kSobol;
   if (!pass.plan.light) values["sampling"] = is_crn ? "crn" : "independent";
@@ -157,9 +158,9 @@ std::vector<std::string> replay_words(OptionValues values, const Pass& pass, con
   options.insert(options.end(), of_integrators.begin(), of_integrators.end());
   std::vector<std::string> words = option_words(options, values);
   const std::string sample =
-      pass.plan.light ? std::to_string(bad.sample) : fmt::format("{},{},{}", bad.x, bad.y, bad.sample);
+      pass.plan.light ? fmt::format("light,{}", bad.sample) : fmt::format("{},{},{}", bad.x, bad.y, bad.sample);
   const std::string number = !pass.plan.light && pass.plan.number ? fmt::format(",{}", pass.plan.number) : "";
-  words.insert(words.end(), {pass.plan.light ? "--replay-light" : "--replay", sample + number});
+  words.insert(words.end(), {"--replay", sample + number});
   return words;
 }
 
@@ -181,8 +182,6 @@ std::vector<std::string> pass_words(OptionValues given, const OptionValues& of_i
   const bool is_plain_pair = estimator.passes == EstimatorPasses::kPair && !estimator.adaptive;
   const bool is_mean = estimator.passes == EstimatorPasses::kAny;
   const bool is_denoised_mean = is_mean && settings.denoising.denoises();
-  // These passes depend on what is denoised.
-  if (settings.passes.chooses_split) words.push_back(estimator_of(settings, of_estimator).text);
   words.push_back(is_plain_pair ? "pair" : is_denoised_mean ? "groups" : is_mean ? kNoEstimator : name.c_str());
   return words;
 }

@@ -42,8 +42,9 @@ RenderRequest request_of(const RenderSettings& settings, const LoadedScene& scen
 void take_training(const LoadedScene& scene, RenderRequest& request);
 
 /// The arguments after `covary render SCENE` that replay one sample of a pass. `given`: options of rendering and of the
-/// integrator.
-std::vector<std::string> replay_words(OptionValues given, const Pass& pass, const BadSample& sample);
+/// integrator. `seed_offset`: what the frame of a sequence adds to the command's seed.
+std::vector<std::string> replay_words(OptionValues given, const Pass& pass, const BadSample& sample,
+                                      uint64_t seed_offset = 0);
 
 /// The options that determine the samples of passes, as words: equal words mean equal passes, whatever is computed from
 /// them.

@@ -53,7 +53,7 @@ TEST(Render, ACropOutsideTheFrameAndImpossibleLimitsAreUsageErrors) {
   EXPECT_THROW(render(scene, average_plan(), request), Error) << "no predicted error";
   request.until = 0;
   request.seconds = 1;
-  EXPECT_THROW(render(scene, samples_plan(make_estimator("polynomials", {{"dimensions", "2"}})), request), Error);
+  EXPECT_THROW(render(scene, samples_plan(make_estimator("polynomials")), request), Error);
 }
 
 /// An estimate that is stopped is restarted for an image of the samples so far, unless it had taken long.

@@ -90,7 +90,6 @@ GuidingLeaf GuidingField::fit_leaf(std::span<const GuidingSample> samples, const
   const Extent extent = extent_of(samples);
   leaf.mixture.pivot = {static_cast<float>(extent.mean[0]), static_cast<float>(extent.mean[1]),
                         static_cast<float>(extent.mean[2])};
-  if (settings_.learn_fraction) leaf.fraction = best_guiding_fraction(samples);
   if (samples.size() < settings_.min_leaf_samples) return leaf;
   double outgoing = 0;
   for (const GuidingSample& s : samples) outgoing += s.outgoing;
@@ -146,7 +145,7 @@ std::string GuidingField::body() const {
     append_bytes(bytes, node.position), append_bytes(bytes, node.axis), append_bytes(bytes, node.child);
   for (const GuidingLeaf& leaf : leaves_) {
     const VmfMixture& mixture = leaf.mixture;
-    append_bytes(bytes, leaf.fraction), append_bytes(bytes, leaf.outgoing);
+    append_bytes(bytes, leaf.outgoing);
     append_bytes(bytes, mixture.pivot), append_bytes(bytes, mixture.lobes.n);
     for (int k = 0; k < mixture.lobes.n; ++k)
       append_bytes(bytes, mixture.lobes.weight[k]), append_bytes(bytes, mixture.lobes.lobe(k)),
@@ -169,11 +168,11 @@ GuidingField GuidingField::from_body(std::string_view bytes, const std::string& 
   }
   for (GuidingLeaf& leaf : field.leaves_) {
     VmfMixture& mixture = leaf.mixture;
-    leaf.fraction = reader.read<float>(), leaf.outgoing = reader.read<float>();
+    leaf.outgoing = reader.read<float>();
     mixture.pivot = reader.read<Vec3>();
     mixture.lobes.n = reader.read<int>();
-    reader.check(mixture.lobes.n >= 0 && mixture.lobes.n <= VmfLobes::kMax && leaf.fraction > 0 && leaf.fraction < 1 &&
-                 leaf.outgoing >= 0 && std::isfinite(leaf.outgoing));
+    reader.check(mixture.lobes.n >= 0 && mixture.lobes.n <= VmfLobes::kMax && leaf.outgoing >= 0 &&
+                 std::isfinite(leaf.outgoing));
     for (int k = 0; k < mixture.lobes.n; ++k) {
       const auto weight = reader.read<float>();
       const auto lobe = reader.read<Vmf>();
@@ -186,22 +185,6 @@ GuidingField GuidingField::from_body(std::string_view bytes, const std::string& 
   }
   reader.check(reader.rest().empty());
   return field;
-}
-
-float best_guiding_fraction(std::span<const GuidingSample> samples) {
-  constexpr int kCandidates = 9;
-  std::array<double, kCandidates> cost = {};
-  bool any = false;
-  for (const GuidingSample& s : samples) {
-    if (!(s.weight > 0 && s.guidable > 0 && s.pdf_guide > 0)) continue;
-    any = true;
-    for (int i = 0; i < kCandidates; ++i) {
-      const float c = 0.1f * static_cast<float>(i + 1) * s.guidable;
-      cost[i] -= s.weight * std::log(std::max((1 - c) * s.pdf_bsdf + c * s.pdf_guide, 1e-30f));
-    }
-  }
-  if (!any) return 0.5f;
-  return 0.1f * static_cast<float>(std::min_element(cost.begin(), cost.end()) - cost.begin() + 1);
 }
 
 }  // namespace covary

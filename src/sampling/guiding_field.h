@@ -27,14 +27,12 @@ struct GuidingSettings {
   uint32_t min_leaf_samples = 100;      ///< a leaf with fewer samples, including zeros, does not guide
   uint32_t max_depth = 32;              ///< of the tree
   uint32_t max_samples = 1u << 22;      ///< kept while training
-  bool learn_fraction = false;          ///< find the best fraction of guided directions for each leaf
 };
 
 /// The mixture of one leaf.
 struct GuidingLeaf {
-  VmfMixture mixture;     ///< without lobes: no guiding
-  float fraction = 0.5f;  ///< learned fraction of directions sampled from the mixture, if learned
-  float outgoing = 0;     ///< mean of GuidingSample::outgoing; 0: too few samples
+  VmfMixture mixture;  ///< without lobes: no guiding
+  float outgoing = 0;  ///< mean of GuidingSample::outgoing; 0: too few samples
 };
 
 class GuidingField {
@@ -93,11 +91,5 @@ class GuidingField {
   uint64_t n_samples_ = 0, n_rejected_ = 0, n_fitted_ = 0;
   double fit_seconds_ = 0;
 };
-
-/// The fraction c of guided directions for which the mixture (1 − c s) BSDF + c s guide best matches the incident light
-/// in cross-entropy, −Σ w log, s being the guidable fraction: among multiples of 0.1 from 0.1 to 0.9; 0.5 without
-/// information. Only samples taken when there was a guide count, since its lobes came from earlier samples.
-/// [Muller2019] minimises the same.
-float best_guiding_fraction(std::span<const GuidingSample> samples);
 
 }  // namespace covary

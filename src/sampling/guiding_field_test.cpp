@@ -125,7 +125,7 @@ TEST(GuidingField, KeepsALimitedNumberOfSamplesEvenly) {
 
 TEST(GuidingField, SameBitsForAnyNumberOfThreads) {
   GuidingSettings settings;
-  settings.leaf_samples = 1000, settings.learn_fraction = true;
+  settings.leaf_samples = 1000;
   std::vector<uint64_t> hashes;
   for (const size_t threads : {1, 2, 5}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
@@ -153,16 +153,6 @@ TEST(GuidingField, BytesComeBackAndDamageIsFound) {
   for (const std::string& damaged :
        {body.substr(0, body.size() / 2), body + "x", std::string(), std::string(8, '\xff')})
     EXPECT_THROW(GuidingField::from_body(damaged, "a.training"), Error);
-}
-
-TEST(GuidingField, LearnsTheBetterTechnique) {
-  std::vector<GuidingSample> samples = two_rooms(1000);
-  for (GuidingSample& s : samples) s.guidable = 1, s.pdf_guide = s.pdf, s.pdf_bsdf = 0.1f;
-  EXPECT_FLOAT_EQ(best_guiding_fraction(samples), 0.9f);
-  for (GuidingSample& s : samples) std::swap(s.pdf_guide, s.pdf_bsdf);
-  EXPECT_FLOAT_EQ(best_guiding_fraction(samples), 0.1f);
-  for (GuidingSample& s : samples) s.pdf_guide = 0;
-  EXPECT_FLOAT_EQ(best_guiding_fraction(samples), 0.5f);
 }
 
 }  // namespace

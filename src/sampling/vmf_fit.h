@@ -22,9 +22,6 @@ struct GuidingSample {
   float inverse_distance = 0;  ///< 1 / distance to the next surface in that direction; 0: infinitely far
   float weight = 0;            ///< radiance / pdf, at least 0
   float pdf = 1;               ///< density with which the direction was sampled, per unit solid angle, positive
-  /// For the learned fraction (guiding_field.h): densities of the BSDF and of the guide alone (0: no guide), and the
-  /// fraction of BSDF samples that guiding may replace.
-  float pdf_bsdf = 0, pdf_guide = 0, guidable = 0;
   float outgoing = 0;  ///< radiance that `position` sends along the path, estimated by the rest of the path, at least 0
 };
 

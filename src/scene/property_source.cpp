@@ -45,12 +45,10 @@ std::optional<std::string> text_of(Parameters& parameters, const Property& prope
 }  // namespace
 
 std::optional<std::string> PropertySource::find(const Option& option) {
-  std::vector<std::string> names = {underscored(option.name)};
-  for (const std::string& alias : option.aliases) names.push_back(underscored(alias));
+  const std::string name = underscored(option.name);
   std::optional<std::string> text;
   for (const Property& property : parameters_.object().properties) {
-    if (std::find(names.begin(), names.end(), property.name) == names.end() || !parameters_.has(property.name))
-      continue;
+    if (property.name != name || !parameters_.has(name)) continue;
     text = text_of(parameters_, property, option);
     if (!text) parameters_.error_at(property.name, "must be " + wanted(option));
   }

@@ -16,24 +16,18 @@ std::string read_frames(const std::string& text, std::optional<FrameRange>& fram
 }  // namespace
 
 void declare(Settings& s, SequenceSettings& v) {
-  static constexpr std::pair<const char*, FrameSeeds> kSeeds[] = {{"own", FrameSeeds::kOwn},
-                                                                  {"same", FrameSeeds::kSame}};
   s.group("Sequences");
-  s.text_as("frames", v.frames, "FIRST-LAST", read_frames, "Render these frames into numbered files: -o OUT_####.exr",
+  s.text_as("frames", v.frames, "FIRST-LAST", read_frames,
+            "Render these frames into numbered files: -o OUT_####.exr; frame n has the seed `seed` + 1,000,000 n",
             {.effect = OptionEffect::kSamples});
   s.text("camera-path", v.camera_path, "FILE", "Position of the camera in each frame (JSON)",
          {.names = OptionNames::kFile, .effect = OptionEffect::kSamples});
   s.real("fps", v.frames_per_second, {.low = 0.01, .high = 1000}, NumberWord{"auto", 0.0},
          "Frame n shows the time n / `fps` of the scene's animations and the camera path; auto: the path's, or 1",
          {.effect = OptionEffect::kSamples});
-  s.choice("frame-seeds", v.seeds, kSeeds,
-           "own: frame n has the seed `seed` + 1,000,000 n, for independent errors; same: `seed` for all frames",
-           {.effect = OptionEffect::kSamples});
   s.on_off("history", v.history,
            "Mix in the previous frame, moved to the current positions, where held-out samples prefer it");
-  s.only_if(v.is_sequence(), {"camera-path", "fps", "frame-seeds", "history"}, "without `frames`");
-  if (v.history && v.seeds == FrameSeeds::kSame)
-    throw Error(ErrorCode::kUsage, "`history` needs `frame-seeds` own: errors of frames must be independent");
+  s.only_if(v.is_sequence(), {"camera-path", "fps", "history"}, "without `frames`");
 }
 
 }  // namespace covary

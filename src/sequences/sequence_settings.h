@@ -10,21 +10,16 @@
 
 namespace covary {
 
-enum class FrameSeeds { kOwn, kSame };
-
 struct SequenceSettings {
   std::string camera_path;  ///< JSON file (plans/camera_path.h); empty: the camera stands still
   std::optional<FrameRange> frames;
   double frames_per_second = 0;  ///< frame n is at time n / this; 0: that of the camera path, or 1
-  FrameSeeds seeds = FrameSeeds::kOwn;
-  bool history = false;  ///< mix in previous frames
+  bool history = false;          ///< mix in previous frames
 
   bool is_sequence() const { return frames.has_value(); }
-  /// The seed of a frame, given the command's `seed`. With kOwn, those of all frames of all commands with seeds below
-  /// 1,000,000 are distinct.
-  uint64_t seed_of(uint64_t seed, int frame) const {
-    return seeds == FrameSeeds::kSame ? seed : seed + static_cast<uint64_t>(frame) * 1'000'000;
-  }
+  /// The seed of a frame is the command's plus this: those of all frames of all commands with seeds below 1,000,000 are
+  /// distinct.
+  static uint64_t seed_offset(int frame) { return static_cast<uint64_t>(frame) * 1'000'000; }
 };
 
 /// Throws Error(kUsage) for a camera path without frames.

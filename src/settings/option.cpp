@@ -13,20 +13,19 @@
 namespace covary {
 namespace {
 
-std::optional<std::string> accepted_whole(const Option& option, const std::string& text, bool in_range) {
+std::optional<std::string> accepted_whole(const Option& option, const std::string& text) {
   if (const std::optional<uint64_t> value = parse_number<uint64_t>(text)) {
-    const bool good = *value <= option.most && (!in_range || option.range.contains(static_cast<double>(*value)));
+    const bool good = *value <= option.most && option.range.contains(static_cast<double>(*value));
     return good ? std::optional(std::to_string(*value)) : std::nullopt;
   }
   const std::optional<int64_t> value = parse_number<int64_t>(text);
-  const bool good =
-      value && *value >= option.least && (!in_range || option.range.contains(static_cast<double>(*value)));
+  const bool good = value && *value >= option.least && option.range.contains(static_cast<double>(*value));
   return good ? std::optional(std::to_string(*value)) : std::nullopt;
 }
 
-std::optional<std::string> accepted_real(const Option& option, const std::string& text, bool in_range) {
+std::optional<std::string> accepted_real(const Option& option, const std::string& text) {
   const std::optional<double> value = parse_number<double>(text);
-  if (!value || !std::isfinite(static_cast<float>(*value)) || (in_range && !option.range.contains(*value))) return {};
+  if (!value || !std::isfinite(static_cast<float>(*value)) || !option.range.contains(*value)) return {};
   return std::string(without_plus(text));
 }
 
@@ -78,12 +77,11 @@ std::string Option::expected() const {
   return fmt::format("{}{} {}{}{}", words_before(*this), range.odd ? "an odd" : "a", kind, link, bounds);
 }
 
-std::optional<std::string> accepted(const Option& option, const std::string& text, bool in_range) {
+std::optional<std::string> accepted(const Option& option, const std::string& text) {
   if (option.type == Option::Type::kFlag || option.type == Option::Type::kText) return text;
   if (is_one_of(option.choices, text)) return text;
   if (!is_number(option)) return {};
-  return option.type == Option::Type::kWhole ? accepted_whole(option, text, in_range)
-                                             : accepted_real(option, text, in_range);
+  return option.type == Option::Type::kWhole ? accepted_whole(option, text) : accepted_real(option, text);
 }
 
 std::string problem_of(const Option& option, const std::string& text) {
@@ -97,8 +95,7 @@ std::string problem_of(const Option& option, const std::string& text) {
 
 const Option* find_option(const std::vector<Option>& options, std::string_view name) {
   for (const Option& option : options)
-    if (option.name == name || std::find(option.aliases.begin(), option.aliases.end(), name) != option.aliases.end())
-      return &option;
+    if (option.name == name || (!option.letter.empty() && option.letter == name)) return &option;
   return nullptr;
 }
 

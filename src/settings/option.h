@@ -32,13 +32,14 @@ enum class OptionNames { kValue, kFile, kFolder, kLibrary, kServer };
 /// case the command that replays one needs it.
 enum class OptionEffect { kImage, kPasses, kSamples };
 
-/// Intended audience: everyone who wants a picture, or experts in the method.
-enum class OptionLevel { kBasic, kExpert };
+/// Intended audience: everyone who wants a picture, or experts in the method; kScene: a property of scene files, not an
+/// option of commands.
+enum class OptionLevel { kBasic, kExpert, kScene };
 
 struct Option {
   enum class Type { kFlag, kWhole, kReal, kChoice, kText };
-  std::string name;                  ///< without dashes: "pilot-window"; with '_' in scene files and Python
-  std::vector<std::string> aliases;  ///< other names, including single letters: "-o"
+  std::string name;    ///< without dashes: "pilot-window"; with '_' in scene files and Python
+  std::string letter;  ///< "o" of -o; may be empty
   Type type = Type::kFlag;
   std::string default_value;  ///< as text; empty for flags, which are off, and if there is none
   OptionRange range;          ///< of numeric options
@@ -62,12 +63,12 @@ struct Option {
   std::string expected() const;
 };
 
-/// Values as given, keyed by name (not alias) without dashes; any text for a flag. Missing options have their defaults.
+/// Values as given, keyed by name without dashes; any text for a flag. Missing options have their defaults.
 using OptionValues = std::map<std::string, std::string>;
 
 /// The value in canonical form: numbers without plus sign or leading zeros. nullopt if `text` is not a valid value;
-/// `in_range` = false skips the range check. Texts pass unchecked: whoever parses them validates them.
-std::optional<std::string> accepted(const Option& option, const std::string& text, bool in_range = true);
+/// Texts pass unchecked: whoever parses them validates them.
+std::optional<std::string> accepted(const Option& option, const std::string& text);
 /// Error for a text that is not accepted: "'x': expected a number above 0".
 std::string problem_of(const Option& option, const std::string& text);
 

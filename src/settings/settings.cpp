@@ -23,7 +23,6 @@ class TextSource final : public SettingsSource {
   void refuse(const Option& option, const std::string& problem) override {
     throw Error(ErrorCode::kUsage, fmt::format("`{}` {}", option.name, problem));
   }
-  bool checks_ranges() const override { return false; }
 
  private:
   OptionValues values_;
@@ -40,7 +39,7 @@ Option Settings::made(Option::Type type, const std::string& name, const std::str
                       const OptionTraits& traits) const {
   Option option;
   option.name = name, option.type = type, option.help = help, option.group = group_;
-  option.aliases = traits.aliases, option.level = traits.level, option.names = traits.names;
+  option.letter = traits.letter, option.level = traits.level, option.names = traits.names;
   option.effect = std::max(traits.effect, effect_), option.film = traits.film;
   return option;
 }
@@ -50,7 +49,7 @@ std::optional<std::string> Settings::declare(Option option) {
   const Option& declared = options_.back();
   const std::optional<std::string> given = source_->find(declared);
   if (!given) return {};
-  std::optional<std::string> value = accepted(declared, *given, source_->checks_ranges());
+  std::optional<std::string> value = accepted(declared, *given);
   if (!value) source_->refuse(declared, problem_of(declared, *given));
   return value;
 }

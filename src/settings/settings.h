@@ -35,7 +35,7 @@ using Choices = std::span<const std::pair<const char*, T>>;
 
 /// Less common properties of an option; see Option.
 struct OptionTraits {
-  std::vector<std::string> aliases = {};
+  std::string letter = {};
   OptionLevel level = OptionLevel::kExpert;
   OptionNames names = OptionNames::kValue;
   OptionEffect effect = OptionEffect::kImage;  ///< raised to the effect of the group if that is larger
@@ -61,14 +61,11 @@ class SettingsSource {
   virtual void leave_out_others() {}
   /// Reports a value that was not accepted: throws, or records the problem and the setting keeps its value.
   virtual void refuse(const Option& option, const std::string& problem) = 0;
-  /// Whether ranges are checked as values are read; otherwise the settings' own validate() checks them.
-  virtual bool checks_ranges() const { return true; }
 };
 
 class Settings {
  public:
-  /// Reads texts. Throws Error(kUsage) "--NAME 'x': expected …" if a text cannot be parsed; ranges are only documented
-  /// here and checked by validate() of the settings struct.
+  /// Reads texts. Throws Error(kUsage) "`NAME` 'x': expected …" for a text that is not a value or out of range.
   explicit Settings(OptionValues values = {});
   explicit Settings(SettingsSource& source) : source_(&source) {}
   ~Settings();

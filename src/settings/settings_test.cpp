@@ -46,7 +46,7 @@ void declare(Settings& s, Fog& v) {
   s.whole<uint32_t>("fog-grid", v.grid, {.low = 1, .high = 9}, {"auto", 0}, "Cells", {.film = "grid={}"});
   s.real("fog-density", v.density, {.low = 0, .high = 1, .above_low = true}, "Density", {.film = "density={:f}"});
   s.real("fog-height", v.height, {}, "Height");
-  s.choice("fog-colour", v.colour, kColours, "Colour", {.aliases = {"fog-color"}, .level = OptionLevel::kBasic});
+  s.choice("fog-colour", v.colour, kColours, "Colour", {.letter = "f", .level = OptionLevel::kBasic});
   s.on_off("fog-jitter", v.jitter, "Whether steps begin at random", {.film = "jitter"});
   s.flag("fog-thick", v.thick, "Many steps", {.film = "thick"});
   s.text("fog-file", v.file, "FILE", "File of densities", {.names = OptionNames::kFile});
@@ -112,7 +112,7 @@ TEST(Settings, DefaultsAreThoseOfTheStruct) {
   EXPECT_EQ(standard("fog-grid"), "auto");
   EXPECT_EQ(standard("fog-density"), "0.5");
   EXPECT_EQ(standard("fog-height"), "");
-  EXPECT_EQ(standard("fog-color"), "red");
+  EXPECT_EQ(standard("fog-colour"), "red");
   EXPECT_EQ(standard("fog-jitter"), "on");
   EXPECT_EQ(standard("fog-thick"), "");
   for (const Option& option : options) {

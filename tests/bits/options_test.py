@@ -25,20 +25,18 @@ MODES = ("auto", "bias", "balanced", "error")
 #: Methods that combine a pair: words of the program.
 PAIR = [
     *[("--estimator", "iicv", *words.split()) for words in (
-        "", "--paper", "--k 9", "--window 7", "--exclude-target", "--asymmetric", "--penalty sample",
-        "--coefficients per-channel", "--residual-correction off", "--residual-correction off --mean-constraint 0",
-        "--residual-correction off --k 50", "--residual-correction off --penalty sample",
-        "--residual-correction off --coefficients per-channel")],
+        "", "--paper", "--k 9", "--window 7", "--penalty asymmetric", "--penalty sample", "--paper --k 50",
+        "--paper --penalty sample", "--paper --penalty asymmetric")],
     *[("--estimator", "cv-baseline", *words.split()) for words in (
-        "", "--ridge 0.1", "--coefficients shared", "--k 50 --window 11")],
+        "", "--ridge 0.1", "--k 50 --window 11")],
     *[("--estimator", "iduw", "--samples", "96", *words) for words in ((), ("--window", "7"))],
-    *[("--estimator", "dependent-tests", *words.split()) for words in ("", "--paper", "--guard off")],
+    *[("--estimator", "dependent-tests", *words.split()) for words in ("", "--paper")],
 ]
 #: With denoising.
 DENOISED_PAIR = [
     *[("--estimator", "iicv", "--denoise", mode, *FILTERS, *GUIDES) for mode in MODES],
     ("--estimator", "iicv", "--denoise", "auto", *FILTERS),
-    ("--estimator", "iicv", "--residual-correction", "off", "--denoise", "error", *NETWORK, *GUIDES),
+    ("--estimator", "iicv", "--paper", "--denoise", "error", *NETWORK, *GUIDES),
     ("--estimator", "cv-baseline", "--denoise", "balanced", *FILTERS, *GUIDES),
 ]
 #: Methods of the independent image alone.
@@ -70,7 +68,7 @@ RENDERED = [
 ]
 OF_RENDER = [("--json", "facts.json"), ("--threads", "1"), ("--threads", "3", "--passes", "films", "--overwrite"),
              ("--aovs",)]
-LAYERS_OF_RENDER = [("--layers",), ("--layers", "--aovs", "--threads", "1")]
+LAYERS_OF_RENDER = [("--layers", "direct"), ("--layers", "direct", "--aovs", "--threads", "1")]
 
 
 def noisy(seed, common):

@@ -48,7 +48,7 @@ class Bdpt(CliTest):
         for options in ((), ("--light-tracing", "on"), ("--estimator", "none", "--adaptive"), ("--estimator", "iicv"),
                         ("--estimator", "iicv", "--adaptive"), ("--estimator", "dependent-tests"),
                         ("--estimator", "dependent-tests", "--paper"),
-                        ("--estimator", "dependent-tests", "--relative-error", "0.1", "--max-spp", "9")):
+                        ("--estimator", "dependent-tests", "--until", "relative=0.1", "--max-spp", "9")):
             self.good("render", "scene.xml", "-o", "a.exr", "--spp", "16", "--quiet", "--no-preview", *options)
             self.assertEqual({v for channel in self.pixels("a.exr") for v in channel}, {0.0}, options)
 

@@ -2,6 +2,7 @@
 """`covary render --integrator controlled-path`: its options, what it reports, and films that belong together."""
 import json
 import os
+import re
 import shutil
 import subprocess
 import unittest
@@ -29,10 +30,7 @@ class Options(CliTest):
                      "--cv-grid=" + grid)
 
     def test_refuses_options_without_effect(self):
-        for option, *others in (("--cv-grid", "8", "--cv", "off"), ("--cv-albedo", "off", "--cv", "vevoda"),
-                                ("--cv-indirect", "on", "--cv", "vevoda"), ("--cv-prefix", "on", "--cv", "optimal-mis"),
-                                ("--cv-variance", "absolute", "--cv", "optimal-mis"),
-                                ("--cv-surrogate", "oidn", "--cv-variance", "absolute"),
+        for option, *others in (("--cv-grid", "8", "--cv", "off"), ("--cv-variance", "absolute", "--cv", "optimal-mis"),
                                 ("--lights", "learned", "--cv-train", "4")):
             self.bad(2, f"{option} has no effect with", *RENDER, "-o", "a.exr", option, *others)
         self.good(*RENDER, "--estimator", "none", "--spp", "20", "-o", "a.exr", "--cv", "off", "--lights", "learned",
@@ -56,10 +54,6 @@ class Options(CliTest):
         self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (12, 0))
         self.assertNotIn("control_variates", report)
         self.assertLess(report["planned_memory_bytes"], 1 << 20)
-
-    def test_warns_of_cells_that_grew(self):
-        result = self.good(*PLAIN, "--spp", "6", "-o", "a.exr", "--cv-grid", "4096", "--cv-memory", "1")
-        self.assertRegex(result.stderr, r"warning: 1 MiB .*--cv-memory.* were reached; cells are \d+ times as wide")
 
 
 class Controlled:
@@ -90,40 +84,18 @@ class Films(Controlled, LearningFilms, CliTest):
         self.bad(1, "seed", *PLAIN, "--spp", "12", "-o", "1.exr", "--seed", "2", "--resume")
 
 
-class Albedo(LearningTest, CliTest):
-    def test_is_on_unless_told_otherwise_or_as_published(self):
-
-        def image(name, *options):
-            self.good(*PLAIN, "--spp", "6", "-o", name + ".exr", *options)
-            return self.pixels(name + ".exr")["R"]
-
-        on, off = image("on", "--cv-albedo", "on"), image("off", "--cv-albedo", "off")
-        self.assertEqual(image("default"), on)
-        self.assertNotEqual(on, off)
-        paper = image("paper", "--cv-paper")
-        self.assertEqual(image("paper-off", "--cv-paper", "--cv-albedo", "off"), paper)
-        self.assertNotEqual(image("paper-on", "--cv-paper", "--cv-albedo", "on"), paper)
-
-    def test_trainings_with_it_and_without_are_not_exchanged(self):
-        self.good(*PLAIN, "--spp", "6", "-o", "a.exr", "--save-training", "a.training")
-        self.good(*PLAIN, "--spp", "2", "-o", "b.exr", "--load-training", "a.training")
-        self.assertEqual(self.pixels("a.exr")["group00.R"], self.pixels("b.exr")["R"])
-        self.bad(1, "a.training", *PLAIN, "--spp", "2", "-o", "c.exr", "--load-training", "a.training", "--cv-albedo",
-                 "off")
-
-
 class Surrogate(LearningTest, CliTest):
     def test_does_not_follow_from_what_is_installed(self):
         self.good(*PLAIN, "--spp", "6", "-o", "a.exr")
-        self.good(*PLAIN, "--spp", "6", "-o", "b.exr", "--cv-surrogate", "filter",
+        self.good(*PLAIN, "--spp", "6", "-o", "b.exr", "--cv-variance", "relative",
                   env={**os.environ, "COVARY_OIDN": "/nowhere"})
         self.assertEqual(self.pixels("a.exr")["R"], self.pixels("b.exr")["R"])
         attributes = json.loads(self.good("info", "a.exr", "--json").stdout)["attributes"]
-        self.assertNotIn("surrogate", attributes["covary:settings"])
+        self.assertNotIn("oidn", attributes["covary:settings"])
 
     def test_by_a_denoiser_that_is_missing(self):
-        result = self.run_covary(*PLAIN, "--spp", "6", "-o", "a.exr", "--passes", "films", "--cv-surrogate", "oidn",
-                                 env={**os.environ, "COVARY_OIDN": "/nowhere"})
+        result = self.run_covary(*PLAIN, "--spp", "6", "-o", "a.exr", "--passes", "films", "--cv-variance",
+                                 "relative-oidn", env={**os.environ, "COVARY_OIDN": "/nowhere"})
         self.assertEqual(result.returncode, 2, result.stderr)
         self.assertIn("Open Image Denoise was not found (/nowhere", result.stderr)
         self.assertFalse((self.path / "a.exr").exists())
@@ -141,7 +113,7 @@ class Surrogate(LearningTest, CliTest):
     def test_by_the_denoiser_that_is_named(self):
         """Another one that the machine has is not taken."""
         library = os.environ["STAND_IN_DENOISER"]
-        by_oidn = (*PLAIN, "--spp", "6", "--cv-surrogate", "oidn")
+        by_oidn = (*PLAIN, "--spp", "6", "--cv-variance", "relative-oidn")
         nowhere = {**os.environ, "COVARY_OIDN": "/nowhere"}
         self.good(*PLAIN, "--spp", "6", "-o", "a.exr")
         self.good(*by_oidn, "-o", "b.exr", "--oidn", library, env=nowhere)
@@ -152,25 +124,25 @@ class Surrogate(LearningTest, CliTest):
         self.assertNotEqual(replay, self.good(*PLAIN, "--spp", "6", "--replay", "7,5,0").stdout)
         self.bad(2, "Open Image Denoise was not found (/nowhere/lib.so", *by_oidn, "-o", "d.exr", "--oidn",
                  "/nowhere/lib.so")
-        self.bad(2, "--cv-surrogate oidn needs Open Image Denoise, which --oidn off leaves out", *by_oidn, "-o",
+        self.bad(2, "--cv-variance relative-oidn needs Open Image Denoise, which --oidn off leaves out", *by_oidn, "-o",
                  "d.exr", "--oidn", "off")
         self.bad(2, "--oidn has no effect without --denoise auto, bias, balanced or error, and no training with "
-                 "--cv-surrogate oidn", *PLAIN, "--spp", "6", "-o", "d.exr", "--oidn", library)
+                 "--cv-variance relative-oidn", *PLAIN, "--spp", "6", "-o", "d.exr", "--oidn", library)
 
     def test_by_a_denoiser_that_is_there(self):
         if self.run_covary("denoise", "--check").returncode != 0:
             self.skipTest("Open Image Denoise is not installed")
         self.good(*PLAIN, "--spp", "6", "-o", "a.exr")
-        self.good(*PLAIN, "--spp", "6", "-o", "b.exr", "--cv-surrogate", "oidn")
+        self.good(*PLAIN, "--spp", "6", "-o", "b.exr", "--cv-variance", "relative-oidn")
         self.assertNotEqual(self.pixels("a.exr")["R"], self.pixels("b.exr")["R"])
         attributes = json.loads(self.good("info", "b.exr", "--json").stdout)["attributes"]
-        self.assertIn("surrogate=oidn", attributes["covary:settings"])
-        self.bad(1, "surrogate=oidn", *PLAIN, "--spp", "8", "-o", "b.exr", "--resume")
+        self.assertIn("variance=relative-oidn", attributes["covary:settings"])
+        self.bad(1, "variance=relative-oidn", *PLAIN, "--spp", "8", "-o", "b.exr", "--resume")
 
 
 class PathLengths(CliTest):
     def test_add_up_to_the_film(self):
-        self.good(*PLAIN, "--spp", "8", "--max-depth", "4", "--path-lengths", "-o", "a.exr")
+        self.good(*PLAIN, "--spp", "8", "--max-depth", "4", "--layers", "path-lengths", "-o", "a.exr")
         channels = read_exr((self.path / "a.exr").read_bytes())
         self.assertEqual(sorted(name for name in channels if name.startswith("Edges") and name.endswith("R")),
                          [f"Edges0{n}.R" for n in range(1, 5)])
@@ -183,15 +155,18 @@ class PathLengths(CliTest):
 
     def test_are_parts_of_what_shorter_paths_see(self):
         off = ("--cv", "off", "--spp", "4", "--estimator", "none")
-        self.good(*RENDER, *off, "--max-depth", "4", "--path-lengths", "-o", "a.exr")
-        self.good(*RENDER, *off, "--max-depth", "2", "--min-depth", "2", "-o", "b.exr")
+        self.good(*RENDER, *off, "--max-depth", "4", "--layers", "path-lengths", "-o", "a.exr")
+        text = Path(ROOM).read_text()
+        (self.path / "direct.xml").write_text(re.sub("(<integrator[^>]*>)", r'\1<integer name="min_depth" value="2"/>',
+                                                     text))
+        self.good("render", "direct.xml", *RENDER[2:], *off, "--max-depth", "2", "-o", "b.exr")
         parts = (read_exr((self.path / name).read_bytes()) for name in ("a.exr", "b.exr"))
         for a, b in zip(*(channels[name] for channels, name in zip(parts, ("Edges02.G", "G")))):
             self.assertAlmostEqual(a, b, delta=1e-5 * (1 + b))
 
     def test_need_the_integrator(self):
-        self.bad(2, "--path-lengths is an option of --integrator controlled-path", "render", ROOM, "-o", "a.exr",
-                 "--path-lengths")
+        self.bad(2, "--layers path-lengths is for --integrator controlled-path", "render", ROOM, "-o", "a.exr",
+                 "--layers", "path-lengths")
 
 
 class TrainingFiles(Controlled, LearningFiles, CliTest):
@@ -200,18 +175,6 @@ class TrainingFiles(Controlled, LearningFiles, CliTest):
         self.good(*learned, "--spp", "12", "-o", "l.exr", "--save-training", "l.training")
         self.good(*learned, "--spp", "4", "-o", "m.exr", "--load-training", "l.training")
         self.assertEqual(self.pixels("l.exr")["group00.G"], self.pixels("m.exr")["G"])
-
-    def test_keep_the_bins_of_directions(self):
-        indirect = (*PLAIN, "--cv-indirect", "on")
-        self.good(*indirect, "--spp", "8", "-o", "i.exr", "--save-training", "i.training")
-        self.good(*indirect, "--spp", "4", "-o", "j.exr", "--load-training", "i.training")
-        self.assertEqual(self.pixels("i.exr")["group00.G"], self.pixels("j.exr")["G"])
-        self.good(*PLAIN, "--spp", "8", "-o", "k.exr", "--save-training", "k.training")
-        self.assertNotEqual(self.pixels("i.exr")["group00.G"], self.pixels("k.exr")["group00.G"])
-        self.bad(1, "k.training", *indirect, "--spp", "4", "-o", "l.exr", "--load-training", "k.training")
-        whole = (self.path / "i.training").read_bytes()
-        (self.path / "i.training").write_bytes(whole[:-7])
-        self.bad(1, "i.training", *indirect, "--spp", "4", "-o", "l.exr", "--load-training", "i.training")
 
     def test_belong_to_control_variates(self):
         self.bad(2, "only the integrator controlled-path with control variates", *RENDER, "--cv", "off", *self.WANTED,

@@ -291,7 +291,7 @@ class Denoise(RenderTest):
         """Of two renders, with and without a network, by covary denoise and combine."""
         for seed in ("1", "2"):
             self.good("render", ROOM, *SMALL, "-o", f"{seed}.exr", "--estimator", "none", "--spp", "8", "--layers",
-                      "--seed", seed)
+                      "direct", "--seed", seed)
         two = ("denoise", "1.exr", "2.exr", "-o", "a.exr")
         for oidn in ("off", os.environ["STAND_IN_DENOISER"]):
             self.good(*two, "--layers", "Direct", "Indirect", "--oidn", oidn)
@@ -320,7 +320,7 @@ class Denoise(RenderTest):
         layers = ("Combined_key", "Combined_fill", "Rest")
         for fog in ("", FOG):
             self.write("lamps.xml", LAMPS.replace("$fog", fog).encode())
-            lamps = ("render", "lamps.xml", "--spp", "8", "--light-groups", "--no-preview")
+            lamps = ("render", "lamps.xml", "--spp", "8", "--layers", "light-groups", "--no-preview")
             for options in (("--estimator", "none"), ("--oidn", "off"), ("--oidn", os.environ["STAND_IN_DENOISER"])):
                 self.good(*lamps, "-o", "a.exr", *options)
                 self.assert_add_up("a.exr", *layers)
@@ -335,10 +335,9 @@ class Denoise(RenderTest):
         self.good("render", "lamps.xml", "--spp", "4", "--estimator", "none", "-o", "c.exr", "--no-preview")
         self.good("render", "lamps.xml", "--spp", "8", "--estimator", "none", "-o", "c.exr", "--resume", "--no-preview")
         self.assertEqual(read_exr((self.path / "c.exr").read_bytes())["G"], once["G"], "the image is as without")
-        room = ("render", ROOM, "-o", "d.exr", "--light-groups")
+        room = ("render", ROOM, "-o", "d.exr", "--layers", "light-groups")
         self.bad(2, "no light of the scene has an id", *room)
-        self.bad(2, "--layers and --light-groups: either of them adds up", *room, "--layers")
-        self.bad(2, "--light-groups need an integrator that separates lights: path", *lamps, "-o", "d.exr",
+        self.bad(2, "--layers light-groups needs an integrator that separates lights: path", *lamps, "-o", "d.exr",
                  "--integrator", "bdpt")
 
     def assert_add_up(self, name, *layers):

@@ -34,7 +34,7 @@ class DependentTests(RenderTest):
         self.assertLess(errors["exact"], errors["paper"])
 
     def test_combine_of_kept_films_gives_the_same_bits(self):
-        for options in ((), ("--filter", "paper", "--max-region", "3")):
+        for options in ((), ("--paper", "--max-region", "3")):
             self.good("render", ROOM, *SMALL, "-o", "a.exr", *METHOD, *options, "--spp", "32", "--passes", "films",
                       "--overwrite")
             self.good("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "b.exr",
@@ -57,7 +57,7 @@ class DependentTests(RenderTest):
         self.same("again/filtered.exr", "steps/filtered.exr")
 
     def test_stages_of_an_image_that_missed_its_target(self):
-        result = self.run_covary("render", ROOM, *SMALL, "-o", "a.exr", *METHOD, "--relative-error", "1e-9",
+        result = self.run_covary("render", ROOM, *SMALL, "-o", "a.exr", *METHOD, "--until", "relative=1e-9",
                                  "--max-spp", "24", "--save-stages", "steps")
         self.assertEqual(result.returncode, 3, result.stderr)
         self.assertEqual(sorted(p.name for p in (self.path / "steps").iterdir()),
@@ -79,8 +79,8 @@ class DependentTests(RenderTest):
         self.same("a.exr", "whole.exr")
 
     def test_relative_error_and_time(self):
-        coarse = self.statistics("-o", "a.exr", *METHOD, "--relative-error", "1")
-        fine = self.statistics("-o", "a.exr", *METHOD, "--relative-error", "0.5")
+        coarse = self.statistics("-o", "a.exr", *METHOD, "--until", "relative=1")
+        fine = self.statistics("-o", "a.exr", *METHOD, "--until", "relative=0.5")
         self.assertGreater(fine["samples_per_pixel"], coarse["samples_per_pixel"])
         timed = self.statistics("-o", "a.exr", *METHOD, "--time", "0.3")
         self.assertTrue(timed["complete"] or timed["samples_per_pixel"] > 1)
@@ -88,19 +88,18 @@ class DependentTests(RenderTest):
     def test_a_relative_error_that_is_not_reached_ends_like_until(self):
         for method in (METHOD, ("--estimator", "iicv", "--adaptive"), ("--estimator", "none", "--adaptive")):
             for limit in (("--spp", "48"), ("--max-spp", "24")):
-                result = self.run_covary("render", ROOM, *SMALL, "-o", "a.exr", *method, "--relative-error", "1e-9",
+                result = self.run_covary("render", ROOM, *SMALL, "-o", "a.exr", *method, "--until", "relative=1e-9",
                                          *limit)
                 self.assertEqual(result.returncode, 3, result.stderr)
-                self.assertIn("--relative-error was not reached: 'a.exr' has ", result.stderr)
+                self.assertIn("--until relative=1e-9 was not reached: 'a.exr' has ", result.stderr)
                 (self.path / "a.exr").unlink()
 
     def test_wrong_options(self):
         render = ("render", ROOM, *SMALL, "-o", "a.exr", *METHOD)
         self.bad(2, "--split: the first pass of dependent-tests has its own number", *render, "--split", "1:2")
-        self.bad(2, "does not estimate its error; see --relative-error", *render, "--until", "relmse=0.1")
-        self.bad(2, "--relative-error: '0': expected a number above 0", *render, "--relative-error", "0")
+        self.bad(2, "does not estimate its error; use relative=X", *render, "--until", "relmse=0.1")
+        self.bad(2, "expected relmse=X, relmse-p95=X or relative=X with X > 0", *render, "--until", "relative=0")
         self.bad(2, "expected a whole number from 1 to 63", *render, "--max-region", "0")
-        self.bad(2, "min-spp is 9, more than max-spp, which is 8", *render, "--min-spp", "9", "--max-spp", "8")
         self.bad(2, "--dependent-spp: '0': expected a whole number of at least 1", *render, "--dependent-spp", "0")
         self.bad(2, "20 samples per pixel are too few for dependent-tests: its first pass takes 20", *render, "--spp",
                  "20", "--dependent-spp", "20")
@@ -132,13 +131,11 @@ class Adaptive(RenderTest):
         self.statistics("-o", "b.exr", "--adaptive", "--oidn", "off", "--spp", "48", "--passes", "films", "--resume")
         self.same("a.exr", "b.exr")
         render = ("render", ROOM, *SMALL, "-o", "c.exr", "--adaptive")
-        self.bad(2, "--allocation denoised is for the mean of independent samples that is denoised", *render,
-                 "--estimator", "none", "--allocation", "denoised")
-        self.bad(2, "--relative-error is that of an image that is not denoised", *render, "--relative-error", "0.1")
+        self.bad(2, "--until relative is for an image that is not denoised", *render, "--until", "relative=0.1")
 
     def test_until(self):
-        first = self.statistics("-o", "a.exr", "--estimator", "none", "--adaptive", "--min-spp", "2", "--spp", "96")
-        facts = self.statistics("-o", "b.exr", "--estimator", "none", "--adaptive", "--min-spp", "2", "--until",
+        first = self.statistics("-o", "a.exr", "--estimator", "none", "--adaptive", "--spp", "96")
+        facts = self.statistics("-o", "b.exr", "--estimator", "none", "--adaptive", "--until",
                                 f"relmse={0.6 * first['predicted_relmse']}")
         self.assertTrue(facts["until_reached"])
 
@@ -146,8 +143,7 @@ class Adaptive(RenderTest):
         render = ("render", ROOM, *SMALL, "-o", "a.exr", "--estimator", "none")
         self.bad(2, "--max-spp has no effect without --adaptive", *render, "--max-spp", "8")
         self.bad(2, "--adaptive always takes independent random numbers", *render, "--adaptive", "--sampling", "crn")
-        self.bad(2, "--min-spp: '0': expected a whole number of at least 1", *render, "--adaptive", "--min-spp", "0")
-        self.bad(2, "iicv: max-spp is 1, expected at least 12, one sample for each group", "render", ROOM, *SMALL,
+        self.bad(2, "--max-spp is 1, expected at least 12, one sample for each group", "render", ROOM, *SMALL,
                  "-o", "a.exr", "--estimator", "iicv", "--adaptive", "--max-spp", "1", "--spp", "96")
 
 

@@ -39,14 +39,8 @@ class Options(CliTest):
         self.assertIn("without light samples (--nee off), point and directional lights are invisible: 1 of ",
                       self.good(*render, "--nee", "off").stderr)
 
-    def test_refuses_impossible_fractions(self):
-        for fraction in ("0", "1", "-0.5", "much", "nan", "0.5x"):
-            self.bad(2, f"--guiding-fraction: '{fraction}': expected learned or a number above 0 and below 1", *PLAIN,
-                     "-o", "a.exr", "--guiding-fraction=" + fraction)
-
     def test_refuses_impossible_numbers(self):
-        for option, value in (("--guiding-lobes", "33"), ("--guiding-lobes", "0"), ("--guiding-leaf", "199"),
-                              ("--guiding-train", "0"), ("--nee", "1")):
+        for option, value in (("--guiding-leaf", "199"), ("--guiding-train", "0"), ("--nee", "1")):
             self.bad(2, option, *PLAIN, "-o", "a.exr", option, value)
 
     def test_refuses_more_training_than_samples(self):
@@ -68,26 +62,21 @@ class Options(CliTest):
 
     def test_settings_of_a_scene(self):
         scene = Path(ROOM).read_text()
-        scene = re.sub(r'<integrator type="path">', '<integrator type="guided-path"><string name="guiding_fraction" '
-                       'value="learned"/><boolean name="nee" value="false"/><integer name="guide_lobes" value="4"/>',
-                       scene, count=1)  # the last by its old name, as is the option below
+        scene = re.sub(r'<integrator type="path">', '<integrator type="guided-path"><integer name="guiding_leaf" '
+                       'value="4000"/><boolean name="nee" value="false"/>', scene, count=1)
         (self.path / "guided.xml").write_text(scene)
         self.good("render", "guided.xml", "--resolution", "24x16", "--no-preview", "--estimator", "none", "--spp", "20",
-                  "--guide-train", "16", "-o", "a.exr")
+                  "--guiding-train", "16", "-o", "a.exr")
         settings = json.loads(self.good("info", "a.exr", "--json").stdout)["attributes"]["covary:settings"]
-        self.assertIn("lobes=4 leaf=8000 train=16 fraction=learned", settings)
+        self.assertIn("leaf=4000 train=16", settings)
         self.assertIn("nee=off", settings)
 
 
 class Guided:
-    RENDER, PLAIN, OTHER_SETTING = RENDER, PLAIN, ("--guiding-lobes", "9")
+    RENDER, PLAIN, OTHER_SETTING = RENDER, PLAIN, ("--guiding-leaf", "900")
 
 
 class Films(Guided, LearningFilms, CliTest):
-    def test_other_fractions_are_other_films(self):
-        self.good(*PLAIN, "--spp", "8", "-o", "a.exr")
-        self.bad(1, "a.exr", *PLAIN, "--guiding-fraction", "0.3", "--spp", "12", "-o", "a.exr", "--resume")
-
     def test_crops_and_times(self):
         self.good(*PLAIN, "--crop", "8,8,16,16", "--spp", "6", "-o", "crop.exr")
         self.good(*PLAIN, "--time", "0.5", "-o", "timed.exr", "--json", "timed.json")
@@ -129,7 +118,7 @@ class Probe(CliTest):
             self.assertNotIn(option[0] + " ", listed)
             self.assertNotIn(f"'probe {option[0]}'", completed)
         self.assertIn("'probe --seed'", completed)
-        for option in ("--seed", "--crop", "--guiding-lobes", "--load-training", "--pixel"):
+        for option in ("--seed", "--crop", "--guiding-train", "--load-training", "--pixel"):
             self.assertRegex(listed, option + "[ ,]")
 
     def test_refuses_what_it_cannot_show(self):

@@ -46,18 +46,9 @@ class Render(LightTest):
         self.assert_sum("a.exr", "films/independent.exr", "films/light.exr")
         self.assertEqual(self.attributes("films/light.exr")["covary:light_paths_per_sample"], "256")
         self.assertEqual(self.attributes("a.exr")["covary:light_film"], "added")
-        facts = self.render("-o", "b.exr", "--estimator", "none", "--spp", "8", "--light-paths", "0.5")
-        self.assertEqual(facts["light_paths"], 4 * PIXELS)
         facts = self.render("-o", "c.exr", "--estimator", "none", "--spp", "8", "--light-tracing", "off")
         self.assertNotIn("light_paths", facts)
         self.assertIn("light_tracing=off", self.attributes("c.exr")["covary:settings"])
-
-    def test_light_paths_without_a_light_pass_are_an_error(self):
-        for given in (IICV, ("--estimator", "dependent-tests"), ("--sampling", "crn")):
-            self.bad(2, "--light-paths has no effect beside a pass with common random numbers", "render", CAUSTIC,
-                     "-o", "a.exr", "--light-paths", "2", *given)
-        self.bad(2, "--light-paths has no effect without light tracing", "render", CAUSTIC, "-o", "a.exr",
-                 "--estimator", "none", "--light-tracing", "off", "--light-paths", "2")
 
     def test_beside_common_random_numbers(self):
         facts = self.render("-o", "off.exr", *IICV, "--spp", "24")
@@ -90,28 +81,23 @@ class Render(LightTest):
 
     def test_replay(self):
         common = ("render", CAUSTIC, "--resolution", "32x24", "--estimator", "none", "--seed", "4")
-        first = self.good(*common, "--replay-light", "0").stdout
+        first = self.good(*common, "--replay", "light,0").stdout
         self.assertRegex(first, r"^light path 0, \d+ rays, \d+ splats\n")
-        self.assertEqual(self.good(*common, "--replay-light", "0").stdout, first)
-        self.bad(2, "--replay and --replay-light exclude each other", *common, "--replay-light", "0", "--replay",
-                 "1,2,0")
-        self.bad(2, "there are no light paths", "render", CAUSTIC, *IICV, "--replay-light", "0")
+        self.assertEqual(self.good(*common, "--replay", "light,0").stdout, first)
+        self.bad(2, "there are no light paths", "render", CAUSTIC, *IICV, "--replay", "light,0")
 
     def test_other_integrators_have_no_such_options(self):
-        for option in (("--light-tracing", "on"), ("--light-paths", "2"), ("--heuristic", "balance")):
-            self.bad(2, f"{option[0]} is an option of --integrator bdpt, not of path", "render", CAUSTIC,
-                     "--integrator", "path", "-o", "a.exr", *option)
-        self.bad(2, "--replay-light is an option of integrators that trace light; 'path' does not", "render", CAUSTIC,
-                 "--integrator", "path", "-o", "a.exr", "--replay-light", "3")
-        self.bad(2, "--light-paths", "render", CAUSTIC, "-o", "a.exr", "--light-paths", "0")
+        self.bad(2, "--light-tracing is an option of --integrator bdpt, not of path", "render", CAUSTIC,
+                 "--integrator", "path", "-o", "a.exr", "--light-tracing", "on")
+        self.bad(2, "--replay light is for integrators that trace light; 'path' does not", "render", CAUSTIC,
+                 "--integrator", "path", "-o", "a.exr", "--replay", "light,3")
         self.bad(2, "'yes': expected auto, on, off", "render", CAUSTIC, "-o", "a.exr", "--light-tracing", "yes")
         self.assertNotIn("light_paths", self.render("-o", "a.exr", "--integrator", "path", "--spp", "24"))
         # The settings of an integrator that another one replaces are no mistakes.
-        element = '<string name="light_tracing" value="on"/><string name="heuristic" value="balance"/></integrator>'
+        element = '<string name="light_tracing" value="on"/></integrator>'
         text = Path(CAUSTIC).read_text().replace("</integrator>", element)
         self.write("own.xml", text.encode())
         self.good("render", "own.xml", *SMALL, "-o", "own.exr", "--spp", "24", "--integrator", "path")
-        self.write("own.xml", text.replace('<string name="heuristic" value="balance"/>', "").encode())
         self.bad(1, "unknown parameter", "render", "own.xml", *SMALL, "-o", "own.exr", "-D", "integrator=path")
 
     def test_lights_without_area_behind_glass(self):

@@ -63,14 +63,14 @@ class OneScreen(HelpTest):
     def test_all_options(self):
         text = self.good("render", "--help-all").stdout
         self.assertLessEqual(max(map(len, text.splitlines())), 100)
-        self.assertLessEqual({"--cv-grid", "--split", "--variance", "--oidn", *self.WANTED}, set(self.options_in(text)))
+        self.assertLessEqual({"--cv-grid", "--split", "--penalty", "--oidn", *self.WANTED}, set(self.options_in(text)))
         lines = text.splitlines()
         for line, below in zip(lines, [*lines[1:], ""], strict=True):
             if re.match(r" {2,6}-", line):
                 self.assertTrue(re.search(r"\S  +\S", line) or below.startswith(27 * " "), line)
         headings = re.findall(r"^(\S.*):$", text, re.M)
         self.assertEqual(headings[:2], ["Arguments", "Options"])
-        self.assertLessEqual({"Sampling", "Paths", "Integrator controlled-path", "Estimator"}, set(headings))
+        self.assertLessEqual({"Sampling", "Integrator controlled-path", "Estimator"}, set(headings))
         self.assertEqual(len(headings), len(set(headings)))
 
     def test_commands(self):

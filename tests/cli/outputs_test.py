@@ -391,11 +391,10 @@ class Numbers(OutputsTest):
 
     def test_names(self):
         combine = ("combine", "--crn", "a.exr", "--independent", "b.exr", "-o", "o.exr")
-        self.bad(2, "--penalty: 'foo': expected pilot, sample; see", *combine,
+        self.bad(2, "--penalty: 'foo': expected pilot, sample, asymmetric; see", *combine,
                  "--penalty", "foo")
         self.bad(2, "--penalty: '3': expected pilot", *combine, "--penalty", "3")
         self.bad(2, "--penalty: 'sampel'; did you mean 'sample'", *combine, "--penalty", "sampel")
-        self.bad(2, "--residual-correction: '1': expected on, off", *combine, "--feedback", "1")
         self.bad(2, "--estimator: 'none': expected mixture, iicv, cv-baseline, iduw", *combine, "--estimator", "none")
 
     def test_a_window_beyond_all_bounds(self):

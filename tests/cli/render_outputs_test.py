@@ -2,6 +2,7 @@
 """What `covary render` leaves behind: after Ctrl-C, short of the wanted error, beside films that are there already."""
 import json
 import os
+import re
 import shlex
 import signal
 import subprocess
@@ -232,10 +233,12 @@ class Numbers(RenderTest):
 
 
     def test_depths_without_light(self):
-        for depths, said in ((("0",), "paths of max_depth 0 have no light; 1 shows lights"), (("1", "0"), None),
-                             (("3", "4"), "no path has min_depth 4 edges and not more than max_depth 3")):
-            options = [word for pair in zip(("--max-depth", "--min-depth"), depths) for word in pair]
-            errors = self.good("render", ROOM, *SMALL, "-o", "a.exr", "--spp", "8", "--overwrite", *options).stderr
+        (self.path / "long.xml").write_text(re.sub("(<integrator[^>]*>)", r'\1<integer name="min_depth" value="4"/>',
+                                                   Path(ROOM).read_text()))
+        for scene, depth, said in ((ROOM, "0", "paths of max_depth 0 have no light; 1 shows lights"), (ROOM, "1", None),
+                                   ("long.xml", "3", "no path has min_depth 4 edges and not more than max_depth 3")):
+            errors = self.good("render", scene, *SMALL, "-o", "a.exr", "--spp", "8", "--overwrite", "--max-depth",
+                               depth).stderr
             self.assertEqual("the image is black" in errors, said is not None, errors)
             self.assertIn(said or "", errors)
 

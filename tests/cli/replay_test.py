@@ -99,10 +99,8 @@ class ReplayTest(CliTest):
                                  (film, *words))
 
     def check_all(self, *options, **more):
-        tests = ("dependent-tests", "--dependent-spp", str(GROUPS), "--allocation", "uniform")
         cropped, sobol = ("--crop", ",".join(map(str, CROP))), ("--sampler", "sobol")
-        for choice in (("none",), ("none", *cropped, *sobol), ("iicv", *cropped), ("iicv", *sobol),
-                       (*tests, *cropped), (*tests, *sobol)):
+        for choice in (("none",), ("none", *cropped, *sobol), ("iicv", *cropped), ("iicv", *sobol)):
             with self.subTest(choice=choice):
                 self.check(*options, "--estimator", *choice, **more)
 

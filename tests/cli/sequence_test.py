@@ -109,8 +109,8 @@ class Frames(SequenceTest):
         self.write_path((0, START))
         self.good_render("-o", "own_#.exr", frames="1-2")
         self.assertNotEqual(self.picture("own_1.exr"), self.picture("own_2.exr"))
-        self.good_render("-o", "same_#.exr", "--frame-seeds", "same", frames="1-2")
-        self.assertEqual(self.picture("same_1.exr"), self.picture("same_2.exr"))
+        self.good_render("-o", "same_#.exr", "--seed", "1000000", frames="1")
+        self.assertEqual(self.picture("same_1.exr"), self.picture("own_2.exr"))
         self.assertLess(max(abs(m) for m in self.channels("own_2.exr")["Motion.X"]), 1e-3)
 
     def test_resume_renders_what_is_missing(self):
@@ -190,9 +190,8 @@ class Frames(SequenceTest):
             result = self.render(*arguments)
             self.assertEqual(result.returncode, 2)
             self.assertIn(message, result.stderr)
-        for more, message in ((("--denoise", "none"), "--history is for frames with --denoise"),
-                              (("--denoise", "auto", "--frame-seeds", "same"), "--history needs --frame-seeds own")):
-            self.assertIn(message, self.render("-o", "f_#.exr", "--history", "on", *more).stderr)
+        self.assertIn("--history is for frames with --denoise",
+                      self.render("-o", "f_#.exr", "--history", "on", "--denoise", "none").stderr)
         self.assertIn("--frames '4-1': expected FIRST-LAST", self.render("-o", "f_#.exr", frames="4-1").stderr)
         alone = self.run_covary("render", "room.xml", "-o", "f.exr", "--camera-path", "path.json")
         self.assertIn("--camera-path has no effect without --frames", alone.stderr)
@@ -306,10 +305,10 @@ class Denoise(SequenceTest):
         wrong = self.denoise("a_#.exr", "b_#.exr", "-o", "d_#.exr", "--motion-scale=-1,-1")
         self.assertEqual(wrong.returncode, 1)
         self.assertIn("'a_2.exr': its motion does not match 'a_1.exr'", wrong.stderr)
-        self.good_render("-o", "c_#.exr", "--frame-seeds", "same", frames="1-2")
-        self.good_render("-o", "d_#.exr", "--frame-seeds", "same", "--seed", "5", "--overwrite",
-                         frames="1-2")
-        self.assertIn("'c_1.exr' and 'c_2.exr' have the same seed, 0",
+        for frame, seed in (("1", 1000000), ("2", 0)):
+            self.good_render("-o", "c_#.exr", "--seed", str(seed), frames=frame)
+            self.good_render("-o", "d_#.exr", "--seed", str(seed + 5), "--overwrite", frames=frame)
+        self.assertIn("'c_1.exr' and 'c_2.exr' have the same seed, 2000000",
                       self.denoise("c_#.exr", "d_#.exr", "-o", "o_#.exr").stderr)
 
     def test_wrong_input(self):

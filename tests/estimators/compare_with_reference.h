@@ -13,10 +13,10 @@
 namespace covary::reference {
 
 /// The neighbours of all pixels (neighbours_test checks them).
-inline std::vector<std::vector<Pixel>> neighbours(const GroupedImage& crn, int k, int window, bool include_target) {
+inline std::vector<std::vector<Pixel>> neighbours(const GroupedImage& crn, int k, int window) {
   const std::vector<unsigned char> valid(static_cast<size_t>(crn.width) * crn.height, 1);
   const Planes guide = moments(crn, valid, window / 2, kFar).mean;
-  const NeighbourSearch search(k, window, include_target);
+  const NeighbourSearch search(k, window);
   std::vector<lanes::vint> keys(search.offsets().size());
   std::vector<uint16_t> chosen(search.chosen_size());
   std::vector<std::vector<Pixel>> result(valid.size());
@@ -39,9 +39,8 @@ struct Difference {
 };
 
 inline Difference compare(const EstimatorResult& fast, const GroupedImage& crn, const GroupedImage& independent,
-                          const RgbImage& error_of_h, int k, int window, bool include_target,
-                          const Settings& settings) {
-  const auto all = neighbours(crn, k, window, include_target);
+                          const RgbImage& error_of_h, int k, int window, const Settings& settings) {
+  const auto all = neighbours(crn, k, window);
   const RgbImage h = map_pixels(independent, [&](int x, int y) { return mean(independent, x, y); });
   const RgbImage variance = map_pixels(independent, [&](int x, int y) { return variance_of_mean(independent, x, y); });
   const RgbImage missing = missing_light(crn, independent);

@@ -76,6 +76,12 @@ def wait_for(condition):
         time.sleep(0.005)
 
 
+def is_locked(path):
+    """Whether a process holds the lock. Does not try to take it, which could get in that process's way."""
+    locks = [line.split() for line in Path("/proc/locks").read_text().splitlines()]
+    return path.exists() and any(lock[5].endswith(f":{path.stat().st_ino}") for lock in locks)
+
+
 def without_times(value):
     """Results without what depends on the clock, the machine's load and the folder."""
     dropped = {"seconds", "efficiency", "equal_time", "date", "command", "files", "origin", "image",
@@ -286,8 +292,7 @@ class Parts(ExperimentTest):
         process = subprocess.Popen(self.command("--reference-spp", "100000", "--part", "1/2"), cwd=self.path,
                                    stderr=subprocess.DEVNULL)
         try:
-            wait_for(lambda: (self.path / "out" / "cache" / "lock-1-of-2").exists())
-            time.sleep(0.2)
+            wait_for(lambda: is_locked(self.path / "out" / "cache" / "lock-1-of-2"))
             self.bad(1, "is in use by another experiment")
             self.bad(1, "is in use by another experiment", "--part", "1/2")
         finally:
@@ -353,24 +358,19 @@ class Resume(ExperimentTest):
         self.suite["methods"] += [{"name": "paper", "options": ["--estimator", "iicv", "--paper", "--k", "9"]},
                                   {"name": "iduw", "options": ["--estimator=iduw"]},
                                   {"name": "other split", "options": ["--estimator", "iicv", "--split", "3:1"]},
-                                  *({"name": f"polynomials {d}",
-                                     "options": ["--estimator", "polynomials", "--dimensions", d]}
-                                    for d in ("2", "3"))]
+                                  {"name": "polynomials", "options": ["--estimator", "polynomials"]}]
         self.suite["budgets"] = [{"spp": 24}]
         self.suite["seeds"] = 1
         self.results("--keep-passes")
         folders = list((self.path / "out" / "cache" / "passes").iterdir())
         pairs = [f for f in folders if (f / "crn.exr").exists()]
         self.assertEqual(len(pairs), 2)
-        self.assertEqual(len(folders) - len(pairs), 3, "films of single passes belong to one method: pt, and each fit")
+        self.assertEqual(len(folders) - len(pairs), 2, "films of single passes belong to one method: pt, and the fit")
 
     def test_one_experiment_at_a_time(self):
         process = subprocess.Popen(self.command("--reference-spp", "100000"), cwd=self.path, stderr=subprocess.DEVNULL)
         try:
-            deadline = time.time() + 20
-            while not (self.path / "out" / "cache" / "lock").exists() and time.time() < deadline:
-                time.sleep(0.02)
-            time.sleep(0.2)
+            wait_for(lambda: is_locked(self.path / "out" / "cache" / "lock"))
             self.bad(1, "is in use by another experiment")
         finally:
             process.kill()
@@ -518,7 +518,7 @@ class Foreign(ExperimentTest):
                                     ("--load-training", "x", "a file"), ("--save-stages", "x", "a folder"),
                                     ("--display-server", "example.org:80", "a server"), ("--json", "x", "a file"),
                                     ("--passes", "x", "a folder"),
-                                    ("--save-passes", "x", "a folder"), ("-o", "x", "a file"),
+                                    ("--passes", "x", "a folder"), ("-o", "x", "a file"),
                                     ("--output", "x", "a file")):
             with self.subTest(option):
                 for words in [option, value], [option + ("=" if option.startswith("--") else "") + value]:

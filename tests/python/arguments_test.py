@@ -46,11 +46,12 @@ COMBINE = {"crn": without_none(NO_GROUPS), "independent": NO_GROUPS, "estimator"
 METRIC = {"image": NO_GROUPS, "reference": NO_GROUPS, "reference2": NO_IMAGE, "low_dynamic_range": NO_FLAG}
 NO_SCENE = (3, None, [1])
 RENDER = {"scene": (*NO_SCENE, ""), "spp": without_none(NO_SPP), "estimator": ("iicvv", *NO_TEXT),
-          "integrator": ("pth", *NO_TEXT), "until": NO_LIMIT, "until_p95": NO_LIMIT, "time": NO_LIMIT, "seed": NO_SEED,
+          "integrator": ("pth", *NO_TEXT), "until": NO_LIMIT, "until_p95": NO_LIMIT,
+          "until_relative": NO_LIMIT, "time": NO_LIMIT, "seed": NO_SEED,
           "denoise": ("yes", *NO_TEXT), "oidn": NO_TEXT, "output": NO_PATH, "passes": NO_PATH,
           "resume": (True, *NO_FLAG), "overwrite": (True, *NO_FLAG), "checkpoint": (-1, 5, "1", True),
           "preview": (True, *NO_FLAG), "aovs": NO_FLAG, "aov_samples": (0, -1, 2.5, "12"),
-          "layers": NO_FLAG, "light_groups": NO_FLAG, "path_lengths": NO_FLAG,
+          "layers": ("dirct", *NO_TEXT),
           "crop": (3, "0,0,4,4", (0, 0, 4), (0, 0, 0, 0), (-1, 0, 4, 4), (0, 0, 4.5, 4), (0, 0, 400, 4)),
           "filter": ("bx", *NO_TEXT), "sampling": ("common", *NO_TEXT), "sampler": ("halton", *NO_TEXT),
           "groups": (0, -1, 1025, 2.5, "12"),
@@ -257,7 +258,7 @@ class Arguments(PackageTest):
         declared = {option["name"].replace("-", "_") for option in covary._covary.render_options()}
         other = {"rfilter": "filter", "no_preview": "preview"}
         taken = set(inspect.signature(covary.render).parameters) - {"scene", "options", "films_only", "progress",
-                                                                    "until_p95"}
+                                                                    "until_p95", "until_relative"}
         of_scene = {"resolution", "environment", "background", "camera"}
         self.assertEqual({other.get(name, name) for name in declared} - of_scene, taken)
         self.assertLessEqual(of_scene, set(inspect.signature(covary.Scene.load).parameters))

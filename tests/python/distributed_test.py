@@ -306,7 +306,6 @@ class Cluster(PackageTest):
         self.assertIn("the ranges divide the samples", refused(self.scene(), 25, sample_ranges=2))
         for options in ({"adaptive": True}, {"settings": {"adaptive": True}}):
             self.assertIn("looks at the whole frame", refused(self.scene(), 24, **options))
-        self.assertIn("tries out the whole frame", refused(self.scene(), 24, settings={"split": "auto"}))
         self.assertIn("use path", refused(self.scene(integrator="bdpt"), 24))
 
     def test_clients_of_no_cluster(self):

@@ -72,8 +72,8 @@ class Estimators(FilesTest):
                               covary.combine(self.crn, self.independent, "iicv").image)
         result = covary.iicv(self.crn, self.independent, paper=True, k=9)
         self.assertEqual(result.estimator, "iicv --paper --k 9")
-        self.assertEqual(covary.cv_baseline(self.crn, self.independent, exclude_target=True).estimator,
-                         "cv-baseline --exclude-target")
+        self.assertEqual(covary.cv_baseline(self.crn, self.independent, ridge=0.5).estimator,
+                         "cv-baseline --ridge 0.5")
         self.assertIsNone(covary.iduw(self.crn, self.independent, samples=96).std_error)
         self.assertIsNone(covary.iduw(self.crn, self.independent, samples=96).bias)
 

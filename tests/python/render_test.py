@@ -60,9 +60,9 @@ class Render(PackageTest):
                   "--estimator", "iicv", "--integrator", "controlled-path", "--aovs")
 
     def test_bidirectional_with_properties(self):
-        scene = self.scene(integrator="bdpt", integrator_options={"light_paths": 2.0}, max_depth=3)
+        scene = self.scene(integrator="bdpt", integrator_options={"light_tracing": "off"}, max_depth=3)
         self.same(covary.render(scene, 8, "none"), "--spp", 8, "--estimator", "none", "--integrator", "bdpt",
-                  "--light-paths", 2, "--max-depth", 3)
+                  "--light-tracing", "off", "--max-depth", 3)
 
     def test_until(self):
         result = covary.render(self.scene(), spp=400, until=0.05)
@@ -71,12 +71,12 @@ class Render(PackageTest):
         self.assertLess(result.samples_per_pixel, 400)
 
     def test_layers(self):
-        result = covary.render(self.scene(), 16, layers=True, oidn="off")
+        result = covary.render(self.scene(), 16, layers="direct", oidn="off")
         layers = result.aovs["Direct"], result.aovs["Indirect"]
         numpy.testing.assert_allclose(sum(layers), result.image, rtol=1e-5, atol=1e-5)
         self.assertTrue(all(layer.max() > 1e-3 for layer in layers))
         with self.assertRaisesRegex(covary.UsageError, "layers: films_only=True makes no image"):
-            covary.render(self.scene(), 16, layers=True, films_only=True)
+            covary.render(self.scene(), 16, layers="direct", films_only=True)
 
     def test_films_only(self):
         whole, films = (covary.render(self.scene(), 24, "iicv", films_only=only) for only in (False, True))

@@ -29,7 +29,6 @@ struct RecordingParts : BidirectionalParts {
 struct Scenery {
   const char* name;
   std::string (*body)();
-  Heuristic heuristic = Heuristic::kPower;
   bool hide_emitters = false;
   const char* lens = "";
 };
@@ -40,12 +39,10 @@ const Scenery kSceneries[] = {
     {"more_materials", [] { return more_materials() + kPoint; }},
     {"all_lights", [] { return materials() + area_lights() + kConstant + kPoint + kSpot + kDirectional; }},
     {"delta_lights", [] { return materials() + kPoint + kSpot + kDirectional; }},
-    {"environment", [] { return materials() + kConstant; }, Heuristic::kPower, false, kThinLens},
-    {"thin_lens", [] { return materials() + area_lights() + kPoint; }, Heuristic::kPower, false, kThinLens},
+    {"environment", [] { return materials() + kConstant; }, false, kThinLens},
+    {"thin_lens", [] { return materials() + area_lights() + kPoint; }, false, kThinLens},
     {"hidden_lights",
-     [] { return materials() + area_lights() + kConstant + sphere("0", "0", "2", "0.2", area_light(9)); },
-     Heuristic::kPower, true},
-    {"balance", [] { return materials() + area_lights() + kPoint; }, Heuristic::kBalance}};
+     [] { return materials() + area_lights() + kConstant + sphere("0", "0", "2", "0.2", area_light(9)); }, true}};
 
 class Bdpt : public ::testing::TestWithParam<Scenery> {
  protected:
@@ -61,13 +58,12 @@ double scale_of(const Spectrum& s) { return std::max(1e-6, static_cast<double>(m
 
 // Both use the same random numbers, densities and heuristic.
 TEST_P(Bdpt, WithoutLightSubpathsItIsThePathTracer) {
-  if (GetParam().heuristic != Heuristic::kPower) return;
   const std::string xml = text(-1, "<integer name='rr_depth' value='3'/>");
   const TestScene path = load_text(xml, 0, [](const PathLengthSettings& lengths) {
     return std::make_shared<PathTracer<PathParts>>("path", lengths);
   });
   const TestScene bdpt = load_text(xml, 0, [](const PathLengthSettings& lengths) {
-    return std::make_shared<BidirectionalTracer<WithoutLightSubpaths>>(BidirectionalSettings{lengths, {}, {}});
+    return std::make_shared<BidirectionalTracer<WithoutLightSubpaths>>(BidirectionalSettings{lengths, {}});
   });
   PassSettings settings;
   int n_lit = 0;
@@ -103,13 +99,10 @@ reference_bdpt::Settings reference_settings(const Scenery& scenery, int max_dept
   reference_bdpt::Settings settings;
   settings.max_depth = max_depth, settings.light_paths_per_spp = light_paths;
   settings.hide_emitters = scenery.hide_emitters;
-  settings.exponent = scenery.heuristic == Heuristic::kBalance ? 1 : 2;
   return settings;
 }
 
-BidirectionalSettings tracer_settings(const Scenery& scenery, const PathLengthSettings& lengths) {
-  return {lengths, {LightTracing::kOn, 1}, scenery.heuristic};
-}
+BidirectionalSettings tracer_settings(const PathLengthSettings& lengths) { return {lengths, {LightTracing::kOn, 1}}; }
 
 // Each technique finds the path that it should, with the value and the weight of the explicit densities, so the weights
 // of all techniques of a path sum to one.
@@ -121,8 +114,7 @@ TEST_P(Bdpt, TechniquesEqualDensitiesWrittenOut) {
         load_text(text(kMaxDepth, "<integer name='rr_depth' value='100'/>"), 0, [&](const PathLengthSettings& lengths) {
           RecordingParts parts;
           parts.contributions = &found;
-          auto tracer =
-              std::make_shared<BidirectionalTracer<RecordingParts>>(tracer_settings(GetParam(), lengths), parts);
+          auto tracer = std::make_shared<BidirectionalTracer<RecordingParts>>(tracer_settings(lengths), parts);
           if (light_tracing) tracer->fix_light_tracing(kSize * kSize, false);
           return tracer;
         });
@@ -159,7 +151,7 @@ TEST_P(Bdpt, SplatsEqualDensitiesWrittenOut) {
   constexpr int kMaxDepth = 5;
   const TestScene scene =
       load_text(text(kMaxDepth, "<integer name='rr_depth' value='100'/>"), 0, [&](const PathLengthSettings& lengths) {
-        auto tracer = std::make_shared<BidirectionalTracer<BidirectionalParts>>(tracer_settings(GetParam(), lengths));
+        auto tracer = std::make_shared<BidirectionalTracer<BidirectionalParts>>(tracer_settings(lengths));
         tracer->fix_light_tracing(kSize * kSize, false);
         return tracer;
       });
@@ -190,7 +182,7 @@ TEST_P(Bdpt, SplatsEqualDensitiesWrittenOut) {
 // Samples traced in a batch (with common random numbers: that share a light subpath) equal those traced alone.
 TEST_P(Bdpt, SamplesDoNotDependOnTheirBatch) {
   const TestScene scene = load_text(text(-1), 0, [](const PathLengthSettings& lengths) {
-    return std::make_shared<BidirectionalTracer<BidirectionalParts>>(BidirectionalSettings{lengths, {}, {}});
+    return std::make_shared<BidirectionalTracer<BidirectionalParts>>(BidirectionalSettings{lengths, {}});
   });
   for (const Sampling sampling : {Sampling::kIndependent, Sampling::kCrn}) {
     PassSettings settings;

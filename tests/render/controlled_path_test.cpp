@@ -309,109 +309,6 @@ TEST(ControlledPath, AlbedoIsUnbiased) {
   EXPECT_LT(noise(black), 0.8 * noise(with_coefficients(plastic, false)));
 }
 
-/// A room with diffuse walls, whose light faces the ceiling.
-std::string indirect_room() {
-  const std::string white =
-      "<bsdf type='twosided'><bsdf type='diffuse'><rgb name='reflectance' value='0.7'/></bsdf>"
-      "</bsdf>";
-  const auto wall = [&](const char* rotation) {
-    return rectangle(("<scale value='6'/><translate z='-6'/>" + std::string(rotation) + "<translate z='5'/>").c_str(),
-                     white.c_str());
-  };
-  return scene_text(wall("<rotate x='1' angle='90'/>") + wall("<rotate x='1' angle='-90'/>") +
-                        wall("<rotate y='1' angle='90'/>") + wall("<rotate y='1' angle='-90'/>") +
-                        wall("<rotate y='1' angle='180'/>") +
-                        rectangle("<scale value='1.5'/><rotate x='1' angle='-90'/><translate x='-2' y='3' z='5'/>",
-                                  "<emitter type='area'><rgb name='radiance' value='30'/></emitter>"),
-                    kSide, kSide, 4, kWide);
-}
-
-ControlSettings with_indirect(ControlKind kind = ControlKind::kRgb) {
-  ControlSettings result = options(kind);
-  result.indirect = true, result.train_spp = 32;
-  return result;
-}
-
-/// Ready to trace, with indirect coefficients only, which increase along the bins.
-template <typename Parts = ControlledParts>
-TestScene with_bins(const std::string& xml) {
-  TestScene scene = controlled<Parts>(xml, with_indirect());
-  std::vector<Spectrum> values;
-  std::vector<uint32_t> bins;
-  Spectrum sum;
-  for (uint32_t bin = 0; bin < DirectionBins::kCount; ++bin) {
-    const auto column = static_cast<float>(bin % DirectionBins::kSide);
-    const auto row = static_cast<float>(bin / DirectionBins::kSide);
-    bins.push_back(bin), values.push_back(Spectrum(row, column, row + column) * 0.3f);
-    sum += values.back() * (1.0f / DirectionBins::kCount);
-  }
-  CoefficientTable table(CellGrid(scene.scene().bounds(), 4, true), DirectionBins::kCount, 0);
-  const CoefficientTable::NewCell cell = {
-      CoefficientTable::root_key(), CoefficientTable::kNone, Spectrum(1), sum, bins, values, {}};
-  table.add_cells({&cell, 1});
-  integrator_of(scene).use(one_cell(scene, 2, [](uint32_t) { return Spectrum(); }), table);
-  EXPECT_TRUE(train(scene.scene(), integrator_of(scene), {}));
-  return scene;
-}
-
-TEST(ControlledPath, BinsOfDirectionsAreEquallyProbable) {
-  std::vector<int> counts(DirectionBins::kCount);
-  constexpr int kSteps = 32;  // a multiple of the number of bins per side
-  for (int y = 0; y < kSteps; ++y)
-    for (int x = 0; x < kSteps; ++x)
-      ++counts[DirectionBins::of({static_cast<float>(x) / kSteps, static_cast<float>(y) / kSteps})];
-  for (const int count : counts) EXPECT_EQ(count, kSteps * kSteps / static_cast<int>(DirectionBins::kCount));
-  const float last = 1 - 0x1p-24f;
-  EXPECT_EQ(DirectionBins::of({last, last}), DirectionBins::kCount - 1);
-}
-
-TEST(ControlledPath, IndirectCoefficientsOfAnySizeAreUnbiased) {
-  const TestScene off = with_coefficients(kRoughMetal, false), on = with_bins(kRoughMetal);
-  const Differences right = differences(on, off, 16, 0);
-  EXPECT_EQ(n_biased(right), 0);
-  EXPECT_LT(detectable(right), 0.05 * image_mean(render(off, 16, 0)));
-  EXPECT_GT(n_biased(differences(with_bins<FailedForgotten>(kRoughMetal), on, 16, 0)), 0);
-}
-
-TEST(ControlledPath, IndirectLightIsControlledWithoutBias) {
-  const TestScene on = trained(everything(), with_indirect());
-  EXPECT_GT(integrator_of(on).indirect_table().n_cells(), 10u);
-  EXPECT_EQ(n_biased(differences(on, load_text(everything()), 16, 100)), 0);
-  EXPECT_EQ(n_biased(differences(on, with_coefficients(everything(), false), 16, 0)), 0);
-  for (const ControlKind kind : {ControlKind::kRgb, ControlKind::kMono})
-    EXPECT_EQ(n_biased(differences(trained(indirect_room(), with_indirect(kind)), load_text(indirect_room()), 8, 100)),
-              0);
-  ControlSettings direct = with_indirect();
-  direct.indirect = false;
-  EXPECT_LT(noise(trained(indirect_room(), with_indirect())), 0.8 * noise(trained(indirect_room(), direct)));
-}
-
-TEST(ControlledPath, IndirectControlHasTheSameBitsForAnyNumberOfThreads) {
-  std::string description;
-  std::optional<Film> film;
-  for (const size_t threads : {1, 2, 5}) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    const TestScene scene = trained(everything(), with_indirect());
-    const Film next = render(scene, 4, 3);
-    if (!film) film.emplace(next), description = scene.integrator().description();
-    EXPECT_TRUE(same_bits(next, *film)) << threads;
-    EXPECT_EQ(scene.integrator().description(), description);
-  }
-}
-
-/// Kinds of control without cells of their own, and paths of fewer edges, have nothing to add.
-TEST(ControlledPath, IndirectControlNeedsCellsAndPathsOfThreeEdges) {
-  for (const ControlKind kind : {ControlKind::kOff, ControlKind::kVevoda, ControlKind::kOptimalMis}) {
-    ControlSettings without = with_indirect(kind);
-    without.indirect = false;
-    EXPECT_TRUE(same_bits(render(trained(everything(), with_indirect(kind)), 2, 0),
-                          render(trained(everything(), without), 2, 0)))
-        << static_cast<int>(kind);
-  }
-  const TestScene direct_light = trained(coloured_lights(), with_indirect());  // at most 2 edges
-  EXPECT_EQ(integrator_of(direct_light).indirect_table().n_cells(), 0u);
-}
-
 TEST(ControlledPath, PixelsHaveOptimalWeightsOfTheirOwn) {
   ControlSettings many = options(ControlKind::kOptimalMis);
   many.train_spp = 64;
@@ -517,14 +414,6 @@ TEST(ControlledPath, LeavesOutTrainingSamplesThatAreNotFinite) {
   EXPECT_EQ(counts, (std::vector<uint32_t>{2, 4}));  // after the pilot, and after the wave that follows it
   EXPECT_GT(integrator_of(scene).cache().n_rejected(), 100u);
   EXPECT_GT(image_mean(render(scene, 2, 0)), 0.1);  // also expects no bad samples
-}
-
-TEST(ControlledPath, KeepsToItsMemoryByWiderCells) {
-  ControlSettings little = options(ControlKind::kRgb);
-  little.grid = 4096, little.memory_mib = 1;
-  const TestScene scene = trained(everything(), little);
-  EXPECT_GT(integrator_of(scene).cache().n_coarsened(), 0u);
-  EXPECT_EQ(n_biased(differences(scene, with_coefficients(everything(), false), 2, 0)), 0);
 }
 
 TEST(ControlledPath, IsToldApartByItsTraining) {

@@ -95,13 +95,10 @@ TestScene with_bug(const std::string& xml, const GuideSettings& options, const T
 const std::string kRoulette = "<integer name='rr_depth' value='3'/>";
 
 TEST(GuidedPath, AgreesWithPathWithLightSamples) {
-  const TestScene path = load_text(everything());
-  for (const float fraction : {0.5f, GuideSettings::kLearnedFraction}) {
-    const TestScene scene = trained(everything(), options(true, fraction));
-    const Differences right = differences(scene, path, 16, 100);
-    EXPECT_EQ(n_biased(right), 0) << fraction;
-    EXPECT_LT(detectable(right), 0.06 * image_mean(render(path, 16, 0)));
-  }
+  const TestScene path = load_text(everything()), scene = trained(everything(), options(true));
+  const Differences right = differences(scene, path, 16, 100);
+  EXPECT_EQ(n_biased(right), 0);
+  EXPECT_LT(detectable(right), 0.06 * image_mean(render(path, 16, 0)));
 }
 
 TEST(GuidedPath, AgreesWithPathWithoutLightSamples) {
@@ -121,7 +118,6 @@ TEST(GuidedPath, HasLessNoiseWhereLightIsHardToFind) {
                  kSide, kSide, 2, kWide);
   const double hardly = noise(trained(xml, options(false, 0.01f))), half = noise(trained(xml, options(false)));
   EXPECT_LT(half, 0.2 * hardly);
-  EXPECT_LT(noise(trained(xml, options(false, GuideSettings::kLearnedFraction))), 0.7 * half);
 }
 
 TEST(GuidedPath, RouletteIsUnbiased) {
@@ -182,9 +178,7 @@ TEST(GuidedPath, SameBitsForAnyNumberOfThreads) {
   std::optional<Film> film;
   for (const size_t threads : {1, 2, 5}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    GuideSettings wanted = controlled(true);
-    wanted.fraction = GuideSettings::kLearnedFraction;
-    const TestScene scene = trained(everything(), wanted);
+    const TestScene scene = trained(everything(), controlled(true));
     const Film next = render(scene, 4, 3);
     if (!film) film.emplace(next), description = scene.integrator().description();
     EXPECT_TRUE(same_bits(next, *film)) << threads;
@@ -208,7 +202,7 @@ TEST(GuidedPath, IsToldApartByItsTraining) {
 }
 
 double trained_mean(const std::string& xml, bool nee) {
-  GuideSettings wanted = options(nee, GuideSettings::kLearnedFraction, 4);
+  GuideSettings wanted = options(nee, 0.5f, 4);
   wanted.control = ControlKind::kRgb, wanted.control_train_spp = 12;
   return image_mean(render(trained(xml, wanted), 2, 0));
 }
