@@ -8,13 +8,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <deque>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "combine/beauty_layers.h"
 #include "combine/combine.h"
 #include "combine/combine_settings.h"
 #include "combine/pair_input.h"
@@ -34,6 +34,7 @@
 #include "json_output.h"
 #include "metrics/provenance.h"
 #include "numbers.h"
+#include "picture_options.h"
 #include "progress.h"
 #include "risk_report.h"
 #include "sequences/frame_names.h"
@@ -47,7 +48,7 @@ namespace {
 struct CombineOptions : CombineSettings {
   OptionValues values, of_estimator;
   FrameOptions of_frames;
-  std::string stages, json;
+  std::string stages, json, view;
   bool quiet = false, overwrite = false;
   int threads = 0;
 };
@@ -125,51 +126,12 @@ nlohmann::ordered_json json_of(const Correlation& c) {
   return {{"value", c.value}, {"standard_error", c.standard_error}, {"pairs", c.pairs}};
 }
 
-/// The layers of --guides.
-struct GuideImages {
-  std::optional<Image> albedo, normal;                      // first hits, if the file has both
-  std::optional<Image> denoising_albedo, denoising_normal;  // first rough surfaces behind mirrors and glass
-  bool clean = false;                                       // without noise, as in covary's own films
-  std::optional<Image> position;
-  Guides view() const {
-    const auto or_null = [](const std::optional<Image>& image) { return image ? &*image : nullptr; };
-    Guides guides{or_null(albedo),           or_null(normal),   or_null(denoising_albedo),
-                  or_null(denoising_normal), or_null(position), clean};
-    if (!albedo) guides.normal = nullptr;
-    return guides;
-  }
-};
-
-GuideImages read_guides(const CombineOptions& o, const Estimator& estimator, const GroupedFile& file) {
+GuideImages guides_of(const CombineOptions& o, const Estimator& estimator, const GroupedFile& file) {
   if (o.guides.empty()) return {};
   if (!estimator.reads_guides)
     throw Error(ErrorCode::kUsage,
                 "--guides is an option of --denoise auto, bias, balanced and error, not of " + estimator.name);
-  const ImageInfo info = inspect_image(o.guides);
-  const auto own = [&](const char* name, GuideKind kind) -> std::optional<Image> {  // guides that `render` wrote
-    const bool is_there = std::any_of(info.channels.begin(), info.channels.end(),
-                                      [&](const auto& c) { return c.name.starts_with(std::string(name) + "."); });
-    return is_there ? std::optional(named_guide(o.guides, info, kind, file.colours(), name)) : std::nullopt;
-  };
-  const auto find = [&](GuideKind kind) { return find_guide(o.guides, info, kind, file.colours()); };
-  GuideImages guides{own("Albedo", GuideKind::kAlbedo),
-                     own("N", GuideKind::kNormal),
-                     own("DenoisingAlbedo", GuideKind::kAlbedo),
-                     own("DenoisingNormal", GuideKind::kNormal),
-                     info.attributes.contains(std::string("covary:") + film_key::kCleanGuides),
-                     find(GuideKind::kPosition)};
-  if (!guides.albedo) guides.albedo = find(GuideKind::kAlbedo);
-  if (!guides.normal) guides.normal = find(GuideKind::kNormal);
-  if (!guides.albedo)
-    throw Error(ErrorCode::kInput,
-                fmt::format("--guides '{}' has no layer Albedo (Albedo.R, .G, .B) under any known name", o.guides));
-  if (const CropWindow& there = info.place.window, &here = file.place().window; !(info.place == file.place()))
-    throw Error(
-        ErrorCode::kInput,
-        fmt::format("--guides '{}' has {} x {} pixels at ({}, {}), the images have {} x {} at "
-                    "({}, {}), or another frame around them",
-                    o.guides, there.width, there.height, there.x, there.y, here.width, here.height, here.x, here.y));
-  return guides;
+  return read_guides(o.guides, file.place(), file.colours());
 }
 
 /// Throws Error(kUsage) if a file is used twice: it would be its own control variate, or add no information.
@@ -216,18 +178,19 @@ struct Inputs {
   std::optional<GroupedFile> crn;
   GroupedFile independent;
   std::optional<GroupedFile> light;
-  std::deque<GroupedFile> layers;
+  std::optional<BeautyLayers> layers;
   GuideImages guides;
   CombineRequest request;
 
-  explicit Inputs(const CombineOptions& o) : independent(o.independent, o.independent_layer) {
-    if (!o.crn.empty()) crn.emplace(o.crn, o.crn_layer);
+  explicit Inputs(const CombineOptions& o)
+      : independent(o.independent, layer_of_view(o.independent[0], o.independent_layer, o.view)) {
+    if (!o.crn.empty()) crn.emplace(o.crn, layer_of_view(o.crn[0], o.crn_layer, o.view));
     if (!o.light.empty()) light.emplace(std::vector{o.light});
     request.estimator = estimator_of(o);
     request.settings = pair_settings(
         request.estimator, request.estimator.needs_sample_count || o.counts.empty() ? o.samples : std::nullopt,
         crn ? crn->samples() : 0, o.error || (!o.json.empty() && request.estimator.predicts_error));
-    guides = read_guides(o, request.estimator, independent);
+    guides = guides_of(o, request.estimator, independent);
     request.settings.guides = guides.view();
     check_explain(o, request.estimator, independent);
     check_stages(o.stages, request.estimator);
@@ -235,8 +198,9 @@ struct Inputs {
     if (crn) request.crn = source_of(*crn);
     request.independent = source_of(independent);
     if (light) request.light = source_of(*light);
-    for (const std::string& name : o.layers)
-      request.layers.push_back({name, source_of(layers.emplace_back(o.independent, name))});
+    if (const bool splits = request.estimator.splits_layers; splits || !o.layers.empty())
+      request.layers =
+          layers.emplace(o.independent, Picture{"", o.view, independent.source().picture}, o.layers, splits).sources();
     constexpr double kMebibyte = 1 << 20, kUsual = 4096 * kMebibyte;
     if (o.memory_mib) request.most_memory = *o.memory_mib * kMebibyte;
     request.memory = request.most_memory.value_or(std::min(kUsual, memory_limit()));
@@ -315,6 +279,7 @@ void combine_files(const CombineOptions& o) {
     progress.begin(o.denoising.denoises() ? "estimating and denoising" : "estimating");
   };
   CombinedImage combined = combine(request);
+  if (inputs.layers) inputs.layers->finish(combined.layers);
   Stopwatch watch;
   progress.begin("writing");
   const std::vector<std::string> lost = write(o, request, inputs.independent.source(), combined);
@@ -355,7 +320,9 @@ void combine_frames(const CombineOptions& o, const FramePatterns& patterns) {
   for_each_frame(o.of_frames, patterns, o.denoising.denoises(), [&](int frame, std::shared_ptr<const History> history) {
     CombineOptions one = frame_options(o, frame);
     one.denoising.history.before = std::move(history);
+    one.quiet = true;
     combine_files(one);
+    return one.output;
   });
 }
 
@@ -366,7 +333,8 @@ void run(CombineOptions o) {
     if (!o.values.contains("denoise")) o.denoising.mode = usual_denoising(o.estimator);
   }
   check_passes(o);
-  FramePatterns patterns{o.independent, {o.guides, o.light}, o.output, o.independent_layer};
+  FramePatterns patterns{o.independent, {o.guides, o.light}, o.output, {o.independent_layer, o.view}};
+  o.of_frames.quiet = o.quiet;
   patterns.images.insert(patterns.images.end(), o.crn.begin(), o.crn.end());
   are_frames(o.of_frames, patterns) ? combine_frames(o, patterns) : combine_files(o);
 }
@@ -388,6 +356,7 @@ void add_combine(CLI::App& app) {
            std::end(kAdaptiveOptions);
   });
   add_options(*command, of_estimator, o->of_estimator);
+  add_value(*command, "--view", o->view, "NAME", "View (eye) of stereo files");
   add_stages_option(*command, o->stages);
   add_threads_option(*command, o->threads);
   add_overwrite_option(*command, o->overwrite);

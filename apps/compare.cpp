@@ -13,6 +13,7 @@
 #include "commands.h"
 #include "compare_frames.h"
 #include "comparison_warnings.h"
+#include "core/printable.h"
 #include "declared_options.h"
 #include "denoising/denoised_references.h"
 #include "film/image_rows.h"
@@ -25,6 +26,7 @@
 #include "metrics/flip.h"
 #include "metrics/metrics.h"
 #include "numbers.h"
+#include "picture_options.h"
 #include "value_names.h"
 
 namespace covary {
@@ -57,7 +59,7 @@ std::vector<Image> denominators_of(const CompareOptions& options, std::vector<Im
   require_image_memory(path, window.width, window.height, 2 * image + kBytesOfDenoisedReferences);
   const auto pixels = [&](ImageRows& file) { return cut({file.place(), file.read_all()}, window); };
   if (!options.denominator.empty()) {
-    ImageRows file(options.denominator, options.layer);
+    ImageRows file(options.denominator, chosen_layer(options.denominator, options.choice));
     file.convert_to(references[0].colours());
     if (!(common_window(path, place, window, options.denominator, file.place()) == window))
       throw Error(ErrorCode::kInput,
@@ -68,7 +70,7 @@ std::vector<Image> denominators_of(const CompareOptions& options, std::vector<Im
 }
 
 Comparison compare_one(const CompareOptions& options, std::vector<ImageRows>& references, const std::string& path) {
-  ImageRows image(path, options.layer);
+  ImageRows image(path, chosen_layer(path, options.choice));
   Comparison comparison;
   comparison.of_image = image.place().window;
   comparison.window =
@@ -111,6 +113,7 @@ nlohmann::ordered_json json_of(const CompareOptions& options, const std::string&
   object["window"] = {c.window.x, c.window.y, c.window.width, c.window.height};
   object["pixels"] = c.results[0].n_pixels;
   object["non_finite_pixels"] = c.results[0].n_non_finite;
+  if (!options.choice.view.empty()) object["view"] = options.choice.view;
   object["mean"] = c.mean();
   object["reference_mean"] = c.reference_mean();
   for (size_t m = 0; m < options.metrics.size(); ++m) {
@@ -224,13 +227,11 @@ void check_files(const CompareOptions& options) {
     outputs.writes_result("--error-map", path, OutputKind::kPng, "compare", options.overwrite);
 }
 
-void compare(const CompareOptions& options) {
-  check_options(options);
-  if (compares_frames(options)) return compare_frames(options);
-  check_files(options);
+/// Compares one view of the files; returns the JSON, if requested.
+std::string compare_view(const CompareOptions& options) {
   std::vector<ImageRows> references;
-  references.emplace_back(options.reference, options.layer);
-  if (!options.reference2.empty()) references.emplace_back(options.reference2, options.layer);
+  for (const std::string& path : {options.reference, options.reference2})
+    if (!path.empty()) references.emplace_back(path, chosen_layer(path, options.choice));
 
   std::vector<Comparison> comparisons;
   for (const std::string& path : options.images) {
@@ -255,8 +256,27 @@ void compare(const CompareOptions& options) {
     for (size_t i = 0; i < comparisons.size(); ++i)
       json += json_text(json_of(options, options.images[i], comparisons[i], warnings[i]), -1);
   if (!json_to_output) print_table(options, comparisons);
-  if (options.json) write_text_output(*options.json, json);
   if (!options.error_map.empty()) write_error_maps(options, comparisons);
+  return json;
+}
+
+void compare(const CompareOptions& options) {
+  check_options(options);
+  if (compares_frames(options)) return compare_frames(options);
+  check_files(options);
+  const std::vector<PictureChoice> views = each_view(options.reference, options.choice);
+  if (views.size() > 1 && !options.error_map.empty())
+    throw Error(ErrorCode::kUsage, "--error-map is an option of one view; name it by --view");
+  const bool json_to_output = options.json && (options.json->empty() || *options.json == "-");
+  std::string json;
+  for (const PictureChoice& view : views) {
+    CompareOptions one = options;
+    one.choice = view;
+    if (views.size() > 1 && !json_to_output)
+      fmt::print("view {}\n", printable(view.view.empty() ? view.layer : view.view));
+    json += compare_view(one);
+  }
+  if (options.json) write_text_output(*options.json, json);
 }
 
 }  // namespace
@@ -278,7 +298,7 @@ void add_compare(CLI::App& app) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->capture_default_str();
-  add_value(*command, "--layer", o->layer, "LAYER", "Compare this layer (N, group03, …) instead of R G B");
+  add_picture_options(*command, o->choice, "Compare", "default: the picture");
   command
       ->add_option("--json", o->json, "One JSON object per image and line; to standard output without FILE or with -")
       ->expected(0, 1)

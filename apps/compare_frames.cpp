@@ -17,6 +17,7 @@
 #include "metrics/alignment.h"
 #include "metrics/metrics.h"
 #include "metrics/sequence_errors.h"
+#include "picture_options.h"
 #include "sequences/frame_names.h"
 
 namespace covary {
@@ -49,7 +50,7 @@ std::vector<Image> denominators_of(const CompareOptions& o, int frame, const std
                                    const CropWindow& window, const std::vector<Image>& references) {
   if (o.denominator.empty()) return denoised_references(references);
   const std::string file = file_of_frame(o.denominator, frame);
-  PlacedImage image = read_image(file, o.layer);
+  PlacedImage image = read_image(file, chosen_layer(file, o.choice));
   if (!(common_window(path, place, window, file, image.place) == window))
     throw Error(ErrorCode::kInput, fmt::format("--denominator '{}' does not cover {}", file, text_of(window)));
   return {cut(std::move(image), window)};
@@ -64,11 +65,11 @@ ComparedSequence compare_sequence(const CompareOptions& o, const std::string& pa
     constexpr double kImages = 12 * 3 * sizeof(float),
                      kFlip = 2 * 120;  // two frames and their references; metrics/flip.cpp
     require_image_memory(path, place.window.width, place.window.height, kImages + kFlip);
-    PlacedImage image = read_image(path, o.layer);
+    PlacedImage image = read_image(path, chosen_layer(path, o.choice));
     std::vector<PlacedImage> sources;
     CropWindow window = image.place.window;
     for (const std::string& reference : reference_paths) {
-      sources.push_back(read_image(reference, o.layer));
+      sources.push_back(read_image(reference, chosen_layer(reference, o.choice)));
       window = common_window(path, image.place, window, reference, sources.back().place);
     }
     const bool low = image.low_dynamic_range && sources[0].low_dynamic_range && sources.back().low_dynamic_range;
@@ -216,6 +217,7 @@ bool compares_frames(const CompareOptions& o) {
       usage(fmt::format("'{}' and '{}': either all images are names with '#', or none", o.images[0], path));
   if (!of_frames && !(o.frames + o.baseline).empty())
     usage("--frames and --baseline need frames, whose names have a '#' for the number");
+  if (of_frames && o.choice.view == "all") usage("--view all is for single images; name one view of frames");
   if (of_frames && !o.error_map.empty()) usage("--error-map is an option of single images, not of frames");
   if (!o.baseline.empty() && !is_frame_pattern_of_input(o.baseline))
     usage(fmt::format("--baseline '{}' has no '#' for the frame number", o.baseline));

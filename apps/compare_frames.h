@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "film/pictures.h"
 #include "metrics/metrics.h"
 
 namespace covary {
@@ -13,7 +14,8 @@ namespace covary {
 /// Options of `covary compare`.
 struct CompareOptions {
   std::vector<std::string> images;
-  std::string reference, reference2, denominator, layer, error_map, frames, baseline;
+  std::string reference, reference2, denominator, error_map, frames, baseline;
+  PictureChoice choice;  ///< of each file
   std::vector<std::string> metrics{"relmse"};
   std::vector<double> error_range;
   std::optional<std::string> json;  // "" and "-": standard output

@@ -15,11 +15,13 @@
 #include "core/error.h"
 #include "declared_options.h"
 #include "film/exr_copy.h"
+#include "film/image_rows.h"
 #include "film/image_writer.h"
 #include "film/outputs.h"
 #include "metrics/error_map.h"
 #include "metrics/provenance.h"
 #include "numbers.h"
+#include "picture_options.h"
 #include "sequences/frame_names.h"
 #include "value_names.h"
 #include "video.h"
@@ -31,7 +33,7 @@ constexpr const char* kOutput = "the output";  // in messages
 
 struct ConvertOptions {
   std::vector<std::string> files;  // the last is the output
-  std::string layer;
+  PictureChoice choice;
   double exposure = 0;
   std::optional<double> rate;  // of a video, frames per second
   bool accept_changed = false, overwrite = false, colours = false;
@@ -52,19 +54,25 @@ Image in_false_colours(const Image& image, const std::string& output) {
 }
 
 /// A picture multiplied by its alpha, if it has any.
-struct Picture {
+struct LoadedPicture {
   PlacedImage colours;
   Image alpha;
 };
 
-Picture read_picture(const ConvertOptions& options, const std::string& path) {
-  Picture picture{read_image(path, options.layer, options.checksums()), {}};
+LoadedPicture read_picture(const ConvertOptions& options, const std::string& path, const std::string& layer) {
+  LoadedPicture picture{read_image(path, layer, options.checksums()), {}};
   if (options.colours) return picture;
-  Alpha alpha = read_alpha(path, options.layer, options.checksums());
+  Alpha alpha = read_alpha(path, layer, options.checksums());
   for (size_t i = 0; alpha.straight && i < alpha.values.data.size(); ++i)
     for (size_t c = 0; c < 3; ++c) picture.colours.image.data[3 * i + c] *= alpha.values.data[i];
   picture.alpha = std::move(alpha.values);
   return picture;
+}
+
+/// All views of the file that are asked for.
+void read_pictures(const ConvertOptions& options, const std::string& path, std::vector<LoadedPicture>& pictures) {
+  for (const PictureChoice& view : each_view(path, options.choice))
+    pictures.push_back(read_picture(options, path, chosen_layer(path, view)));
 }
 
 /// The images side by side, top-aligned, with 0 below shorter ones.
@@ -85,12 +93,12 @@ Image side_by_side(const std::vector<const Image*>& images) {
 }
 
 /// The frames of the pictures side by side, opaque without alpha; the picture itself if there is only one.
-Picture joined(std::vector<Picture> pictures) {
+LoadedPicture joined(std::vector<LoadedPicture> pictures) {
   if (pictures.size() == 1) return std::move(pictures[0]);
   const bool has_alpha =
-      std::any_of(pictures.begin(), pictures.end(), [](const Picture& p) { return !p.alpha.data.empty(); });
+      std::any_of(pictures.begin(), pictures.end(), [](const LoadedPicture& p) { return !p.alpha.data.empty(); });
   std::vector<const Image*> colours, alphas;
-  for (Picture& picture : pictures) {
+  for (LoadedPicture& picture : pictures) {
     picture.colours.image = framed(picture.colours.image, picture.colours.place);
     const Image& image = picture.colours.image;
     colours.push_back(&image);
@@ -101,7 +109,7 @@ Picture joined(std::vector<Picture> pictures) {
       picture.alpha = framed(picture.alpha, picture.colours.place);
     alphas.push_back(&picture.alpha);
   }
-  Picture all;
+  LoadedPicture all;
   Image& image = all.colours.image = side_by_side(colours);
   if (has_alpha) all.alpha = side_by_side(alphas);
   all.colours.place = {image.width, image.height, {0, 0, image.width, image.height}};
@@ -124,7 +132,7 @@ std::map<std::string, std::string> attributes_of(const ConvertOptions& options, 
       options.exposure + (earlier == attributes.end() ? 0 : parse_real(earlier->second).value_or(0));
   attributes.erase(kExposureAttribute);
   if (exposure != 0) attributes[kExposureAttribute] = fmt::format("{:g}", exposure);
-  if (!options.layer.empty()) attributes["covary:layer"] = options.layer;
+  if (!options.choice.layer.empty()) attributes["covary:layer"] = options.choice.layer;
   attributes["covary:version"] = COVARY_VERSION;
   attributes["covary:command"] = command_line();
   return attributes;
@@ -153,7 +161,9 @@ void expose(const ConvertOptions& options, Image& image) {
 /// EXR to EXR: what does not change stays as it is. A layer becomes the picture of a file of its own.
 void convert_exr(const ConvertOptions& options) {
   const std::string &input = options.files[0], &output = options.files[1];
-  const bool is_layer = !options.layer.empty(), is_same_picture = !is_layer && options.exposure == 0;
+  const bool is_all = options.choice.layer.empty() && options.choice.view == "all";
+  const std::string layer = is_all ? "" : chosen_layer(input, options.choice);
+  const bool is_layer = !is_all && !is_unnamed(options.choice), is_same_picture = !is_layer && options.exposure == 0;
   ExrChanges changes;
   changes.attributes = attributes_of(options, is_same_picture);
   PlacedImage image;
@@ -161,14 +171,14 @@ void convert_exr(const ConvertOptions& options) {
   if (!is_same_picture) {
     check_memory(options);
     const ExrFile file(input, options.checksums());
-    const std::vector<std::string> names = layer_channels(input, file.channels(), options.layer);
-    image = read_image(input, options.layer, options.checksums(), std::nullopt);
+    const std::vector<std::string> names = layer_channels(input, file.channels(), layer);
+    image = read_image(input, layer, options.checksums(), std::nullopt);
     expose(options, image.image);
     const bool is_grey = names[0] == names[2];
     for (size_t c = 0; c < (is_grey && !is_layer ? 1 : 3); ++c)
       changes.planes.push_back({is_layer ? std::string(1, "RGB"[c]) : names[c], ExrPlane::Type::kFloat,
                                 image.image.data.data() + c, 3 * sizeof(float)});
-    if (is_layer) alpha = read_alpha(input, options.layer, options.checksums());
+    if (is_layer) alpha = read_alpha(input, layer, options.checksums());
     if (!alpha.values.data.empty()) add_image_planes("A", alpha.values, changes.planes);
     changes.picture = names[0];
     changes.only_planes = is_layer;
@@ -179,6 +189,26 @@ void convert_exr(const ConvertOptions& options) {
   }
   for (const std::string& what : write_changed_exr(output, input, changes, options.checksums()))
     fmt::print(stderr, "warning: {}\n", what);
+}
+
+/// A picture that fills its frame to PNG, in the memory of a few rows; false if it is of another kind.
+bool convert_to_png_by_rows(const ConvertOptions& options) {
+  if (options.files.size() > 2 || options.colours || options.choice.view == "all" ||
+      lower_extension(options.files[1]) != ".png")
+    return false;
+  const std::string& input = options.files[0];
+  ImageRows file(input, chosen_layer(input, options.choice), options.checksums());
+  const ImagePlace& place = file.place();
+  if (!(place.window == CropWindow{0, 0, place.frame_width, place.frame_height})) return false;
+  file.convert_to(ColourSpace::rec709());
+  write_png_rows(options.files[1], place.frame_width, place.frame_height, [&](int first, int n) {
+    Image colours = file.read(first, n), alpha = file.has_alpha() ? file.read_alpha(first, n) : Image();
+    for (size_t i = 0; file.has_straight_alpha() && i < alpha.data.size(); ++i)
+      for (size_t c = 0; c < 3; ++c) colours.data[3 * i + c] *= alpha.data[i];
+    expose(options, colours);
+    return std::pair(std::move(colours), std::move(alpha));
+  });
+  return true;
 }
 
 /// Converts numbered images, or several sequences side by side, to a video.
@@ -202,9 +232,9 @@ void convert_frames(const ConvertOptions& options) {
   outputs.writes_result(kOutput, output, OutputKind::kText, "convert", options.overwrite);
   VideoWriter video(output, options.rate.value_or(kUsualRate));
   for (const int frame : frames) {
-    std::vector<Picture> pictures;
-    for (const std::string& input : inputs) pictures.push_back(read_picture(options, frame_name(input, frame)));
-    const Picture picture = joined(std::move(pictures));
+    std::vector<LoadedPicture> pictures;
+    for (const std::string& input : inputs) read_pictures(options, frame_name(input, frame), pictures);
+    const LoadedPicture picture = joined(std::move(pictures));
     Image image = framed(picture.colours.image, picture.colours.place);
     expose(options, image);
     video.add(image);
@@ -223,10 +253,11 @@ void convert(const ConvertOptions& options) {
   outputs.writes_result(kOutput, output, OutputKind::kImage, "convert", options.overwrite);
   if (inputs.size() == 1 && lower_extension(output) == ".exr" && !options.colours && is_exr_image(inputs[0]))
     return convert_exr(options);
+  if (convert_to_png_by_rows(options)) return;
   check_memory(options);
-  std::vector<Picture> pictures;
-  for (const std::string& input : inputs) pictures.push_back(read_picture(options, input));
-  Picture picture = joined(std::move(pictures));
+  std::vector<LoadedPicture> pictures;
+  for (const std::string& input : inputs) read_pictures(options, input, pictures);
+  LoadedPicture picture = joined(std::move(pictures));
   expose(options, picture.colours.image);
   write_image(output, picture.colours.image, picture.colours.place, attributes_of(options, false), picture.alpha);
 }
@@ -247,8 +278,7 @@ void add_convert(CLI::App& app) {
       ->check(real_number(-100, 100))
       ->capture_default_str();
   command->add_option("--fps", o->rate, "Frames per second of a video; default: 24")->check(real_number(0.01, 1000));
-  add_value(*command, "--layer", o->layer, "LAYER",
-            "Layer (N, group03, …) or single channel (samples) instead of R G B");
+  add_picture_options(*command, o->choice, "Convert", "default: the picture; 'all' puts views side by side");
   command->add_flag("--false-colours", o->colours,
                     "Show brightness in the colours of error maps, e.g. for --layer StdError; their scale is printed");
   command->add_flag("--accept-changed", o->accept_changed,

@@ -9,28 +9,33 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <deque>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 
+#include "combine/beauty_layers.h"
 #include "combine/combine.h"
 #include "combine/registry.h"
 #include "combine/result_file.h"
 #include "commands.h"
 #include "core/error.h"
+#include "core/printable.h"
 #include "core/stopwatch.h"
 #include "declared_options.h"
 #include "denoising/mixed_denoising.h"
 #include "film/denoised_by.h"
+#include "film/exr_copy.h"
 #include "film/image_rows.h"
 #include "film/outputs.h"
+#include "film/pictures.h"
 #include "filters/stray_values.h"
 #include "frame_files.h"
 #include "guide_layer.h"
 #include "json_output.h"
 #include "metrics/provenance.h"
 #include "numbers.h"
+#include "picture_options.h"
 #include "progress.h"
 #include "risk_report.h"
 #include "sequences/frame_names.h"
@@ -44,7 +49,8 @@ constexpr const char* kNetwork = "oidn";
 
 struct Options {
   std::vector<std::string> inputs;
-  std::string output, layer, mode, oidn, albedo, normal, json;
+  std::string output, mode, oidn, albedo, normal, json;
+  PictureChoice choice;
   std::vector<std::string> layers;
   bool no_guides = false, clean_guides = false, check = false, quiet = false, force = false, overwrite = false;
   FrameOptions of_frames;
@@ -69,103 +75,104 @@ void warn_of_values(const std::string& path, const Image& image) {
              path, replaced.size(), image.data.size() / 3, kMostOfPicture, replaced[0].x, replaced[0].y);
 }
 
-/// The guide layers, each averaged over the files that have it.
-class GuideLayers {
- public:
-  std::optional<Image> albedo, normal, position;
-
-  /// `colours`: of the picture.
-  GuideLayers(const Options& o, const ColourSpace& colours) {
-    if (o.no_guides) return;
-    for (const std::string& path : o.inputs) {
-      const ImageInfo info = inspect_image(path);
-      add(path, guide(path, info, o, o.albedo, GuideKind::kAlbedo, colours), albedo, n_albedo_);
-      add(path, guide(path, info, o, o.normal, GuideKind::kNormal, colours), normal, n_normal_);
-      add(path, find_guide(path, info, GuideKind::kPosition, colours, o.layer), position, n_position_);
-    }
-    divide(albedo, n_albedo_);
-    divide(normal, n_normal_);
-    divide(position, n_position_);
-    if (!albedo) normal.reset();  // Open Image Denoise only takes normals together with an albedo
+/// One picture of the inputs: what is denoised, and where the result goes.
+struct Task {
+  Picture picture;    ///< what the result replaces
+  std::string layer;  ///< what is denoised: the picture, or the render before Cycles denoised it
+  bool is_only = true;
+  std::string text() const {
+    return is_only ? "" : fmt::format(" ({})", picture.layer.empty() ? "R G B" : picture.layer);
   }
-  Guides view() const {
-    const auto or_null = [](const std::optional<Image>& image) { return image ? &*image : nullptr; };
-    return {or_null(albedo), or_null(normal), nullptr, nullptr, or_null(position)};
-  }
-  const char* text() const {
-    return normal ? "guided by albedo and normal" : albedo ? "guided by albedo" : "without guides";
-  }
-
- private:
-  static std::optional<Image> guide(const std::string& path, const ImageInfo& info, const Options& o,
-                                    const std::string& name, GuideKind kind, const ColourSpace& colours) {
-    if (name.empty()) return find_guide(path, info, kind, colours, o.layer);
-    return named_guide(path, info, kind, colours, name);
-  }
-
-  static void add(const std::string& path, std::optional<Image> layer, std::optional<Image>& sum, float& n) {
-    if (!layer) return;
-    n += 1;
-    if (!sum)
-      sum = std::move(layer);
-    else if (sum->data.size() != layer->data.size())
-      throw Error(ErrorCode::kInput, fmt::format("'{}' has {} x {} pixels, others have {} x {}", path, layer->width,
-                                                 layer->height, sum->width, sum->height));
-    else
-      std::transform(sum->data.begin(), sum->data.end(), layer->data.begin(), sum->data.begin(), std::plus<>());
-  }
-
-  static void divide(std::optional<Image>& sum, float n) {
-    if (sum)
-      for (float& value : sum->data) value /= n;
-  }
-
-  float n_albedo_ = 0, n_normal_ = 0, n_position_ = 0;
+  std::string prefix() const { return is_only || picture.layer.empty() ? "" : picture.layer + "."; }
 };
 
-/// Writes the result in place of the picture of the first input.
-void write(const Options& o, const ImagePlace& place, const std::map<std::string, std::string>& attributes,
-           EstimatorResult& result, std::map<std::string, Image> layers, const ResultSource& source,
-           ProgressLine& progress) {
-  const std::vector<std::string> lost = write_result(o.output, place, attributes, result, layers, source);
-  progress.finish();
-  for (const std::string& what : lost) fmt::print(stderr, "warning: {}\n", what);
+/// A denoised picture, and what to say about it.
+struct Denoised {
+  ResultPicture result;
+  std::map<std::string, std::string> attributes;
+  std::optional<PredictedError> predicted;
+  nlohmann::ordered_json json;
+  std::function<void()> report;
+};
+
+/// What is denoised: the picture of each view and view layer, if none is named.
+std::vector<Task> tasks_of(const Options& o) {
+  const std::vector<ExrFile::Channel> channels = inspect_image(o.inputs[0]).channels;
+  std::vector<Picture> pictures = find_pictures(channels);
+  if (!o.choice.layer.empty() || !o.choice.view.empty() || pictures.empty())
+    pictures = is_unnamed(o.choice) ? std::vector<Picture>(1) : chosen_pictures(o.inputs[0], channels, o.choice);
+  std::vector<Task> tasks;
+  for (const Picture& picture : pictures) {
+    const std::string noisy = picture.layer == o.choice.layer ? "" : noisy_layer(picture, channels);
+    if (!noisy.empty())
+      fmt::print(stderr, "note: {}: '{}' is denoised already; '{}' beside it, which is not, is denoised instead\n",
+                 printable(o.inputs[0]), picture.layer, noisy);
+    tasks.push_back({picture, noisy.empty() ? picture.layer : noisy, pictures.size() == 1});
+  }
+  return tasks;
 }
 
-void denoise_by_network(const Options& o, const GuideLayers& guides, ProgressLine& progress) {
+GuideLayers guides_of(const Options& o, const Task& task, const ColourSpace& colours) {
+  return GuideLayers({o.inputs, task.picture, colours, o.albedo, o.normal, o.no_guides});
+}
+
+std::map<std::string, std::string> new_attributes(const Options& o) {
+  std::map<std::string, std::string> attributes = inherited_attributes(o.inputs);
+  attributes["covary:version"] = COVARY_VERSION;
+  attributes["covary:command"] = command_line();
+  return attributes;
+}
+
+/// Alpha as an image; empty if it is 0 or 1 everywhere, with nothing to denoise.
+Image partial_alpha(const std::string& path, const std::string& channel) {
+  Image alpha = read_image(path, channel, ChecksumPolicy::kCheck, std::nullopt).image;
+  const bool partial = std::any_of(alpha.data.begin(), alpha.data.end(), [](float a) { return a > 0 && a < 1; });
+  return partial ? alpha : Image();
+}
+
+Image as_alpha(const Image& grey) {
+  Image alpha(grey.width, grey.height, 1);
+  for (size_t i = 0; i < alpha.data.size(); ++i) alpha.data[i] = std::clamp(grey.data[3 * i], 0.0f, 1.0f);
+  return alpha;
+}
+
+Denoised denoise_by_network(const Options& o, const Task& task, ProgressLine& progress) {
   const Stopwatch watch;
   const std::string& input = o.inputs[0];
   const ImageInfo info = inspect_image(input);
   constexpr double kImages = 4 * 3 * sizeof(float), kNetworkBytes = 600;  // per pixel: image, guides and result
   require_image_memory(input, info.place.window.width, info.place.window.height, kImages + kNetworkBytes);
-  const PlacedImage image = read_image(input, o.layer, ChecksumPolicy::kCheck, std::nullopt);
+  const GuideLayers guides = guides_of(o, task, ImageRows(input, task.layer).colours());
+  const PlacedImage image = read_image(input, task.layer, ChecksumPolicy::kCheck, std::nullopt);
   warn_of_values(input, image.image);
-  if (const std::string by = denoised_by(info.attributes, info.channels); !by.empty())
+  if (const std::string by = denoised_by(info.attributes, info.channels, task.layer); !by.empty())
     fmt::print(stderr, "warning: {} is denoised already ({}); give the render before denoising\n", input, by);
   progress.begin("denoising");
   Denoiser denoiser(o.denoiser());
   std::optional<Image> albedo = guides.albedo, normal = guides.normal;
   if (o.clean_guides && albedo) albedo = denoiser.denoise_guide("albedo", *albedo);
   if (o.clean_guides && normal) normal = denoiser.denoise_guide("normal", *normal);
-  Image result =
-      denoiser.denoise(image.image, albedo ? &*albedo : nullptr, normal ? &*normal : nullptr, o.clean_guides);
-  progress.begin("writing");
-  std::map<std::string, std::string> attributes = inherited_attributes(o.inputs);
-  attributes["covary:version"] = COVARY_VERSION;
-  attributes["covary:command"] = command_line();
-  attributes["covary:denoiser"] = "Open Image Denoise " + denoiser_info(o.denoiser()).version;
-  const std::vector<std::string> picture = layer_channels(input, info.channels, o.layer);
-  EstimatorResult denoised;
-  denoised.estimate = std::move(result);
-  write(o, image.place, attributes, denoised, {}, {o.inputs, {picture[0], picture[1], picture[2]}, {}}, progress);
-  if (!o.quiet)
-    fmt::print(stderr, "{}: {} x {}, {}, in {:.2f} s\n", o.output, image.image.width, image.image.height, guides.text(),
-               watch.seconds());
+  const auto denoised = [&](const Image& noisy) {
+    return denoiser.denoise(noisy, albedo ? &*albedo : nullptr, normal ? &*normal : nullptr, o.clean_guides);
+  };
+  Denoised result;
+  const std::vector<std::string> picture = layer_channels(input, info.channels, task.picture.layer);
+  result.result.image.estimate = denoised(image.image);
+  result.result.source = {o.inputs, {picture[0], picture[1], picture[2]}, {}, task.prefix()};
+  const std::string alpha = is_exr_image(input) ? alpha_channel(info.channels, picture[0]) : "";
+  if (Image values = alpha.empty() ? Image() : partial_alpha(input, alpha); !values.data.empty())
+    result.result.aovs[alpha] = as_alpha(denoised(values));
+  result.attributes = new_attributes(o);
+  result.attributes["covary:denoiser"] = "Open Image Denoise " + denoiser_info(o.denoiser()).version;
+  result.report = [=, width = image.image.width, height = image.image.height, seconds = watch.seconds(),
+                   text = guides.text()] {
+    fmt::print(stderr, "{}{}: {} x {}, {}, in {:.2f} s\n", o.output, task.text(), width, height, text, seconds);
+  };
+  return result;
 }
 
-void write_statistics(const Options& o, const CombineRequest& request, const CombinedImage& combined,
-                      const DenoisingChoice& choice) {
-  if (o.json.empty()) return;
+nlohmann::ordered_json statistics(const Options& o, const CombineRequest& request, const CombinedImage& combined,
+                                  const DenoisingChoice& choice) {
   nlohmann::ordered_json json{
       {"output", o.output},
       {"estimator", request.estimator.text},
@@ -178,39 +185,68 @@ void write_statistics(const Options& o, const CombineRequest& request, const Com
   add_risks(combined.image.risks, json);
   add_network(request.estimator.network, combined.image.network_runs, choice, json);
   if (!combined.image.note.empty()) json["note"] = combined.image.note;
-  write_text_output(o.json, json_text(json));
+  return json;
 }
 
-void denoise_by_mixture(const Options& o, const GroupedFile& file, const GuideLayers& guides, ProgressLine& progress) {
+Denoised denoise_by_mixture(const Options& o, const Task& task, const GroupedFile& file, ProgressLine& progress) {
   CombineRequest request;
   request.independent = source_of(file);
   const DenoisingChoice choice{o.mode.empty() ? usual_denoising(kDefaultEstimator) : o.mode, o.oidn, {o.history}};
   request.estimator = make_default_estimator(false, {}, choice);
   request.settings.std_error = true;
+  const GuideLayers guides = guides_of(o, task, file.colours());
   request.settings.guides = guides.view();
-  std::deque<GroupedFile> layers;
-  for (const std::string& name : o.layers)
-    request.layers.push_back({name, source_of(layers.emplace_back(o.inputs, name))});
+  const BeautyLayers layers(o.inputs, task.picture, o.layers, true);
+  request.layers = layers.sources();
   request.force = o.force;
   request.checked = [&](const InputFindings& found) {
     progress.clear();
     print_findings(found.findings, o.force, o.quiet);
     progress.begin("denoising");
   };
-  CombinedImage combined = combine(request);
+  auto combined = std::make_shared<CombinedImage>(combine(request));
+  layers.finish(combined->layers);
+  Denoised result;
+  result.json = statistics(o, request, *combined, choice);
+  if (!task.is_only) result.json["picture"] = task.picture.layer;
+  result.result.source = file.source();
+  if (!task.picture.channels[0].empty()) result.result.source.picture = task.picture.channels;
+  result.result.source.prefix = task.prefix();
+  result.attributes = new_attributes(o);
+  result.attributes["covary:estimator"] = request.estimator.text;
+  if (!request.estimator.network.empty()) result.attributes["covary:denoiser"] = request.estimator.network;
+  if (file.samples() > 0) result.attributes["covary:samples"] = fmt::to_string(file.samples());
+  result.predicted = combined->predicted;
+  result.result.image = std::move(combined->image);
+  combined->image = {};
+  combined->image.risks = result.result.image.risks, combined->image.note = result.result.image.note;
+  result.result.aovs = std::move(combined->layers);
+  const std::string what = fmt::format("{}{}: {} x {}, {} of {}, {}, in {:.2f} s", o.output, task.text(), file.width(),
+                                       file.height(), request.estimator.text, file.groups_text(), guides.text(),
+                                       combined->check_seconds + combined->estimate_seconds);
+  result.report = [what, combined, choice] {
+    fmt::print(stderr, "{}\n", what);
+    print_risks(*combined, choice);
+  };
+  return result;
+}
+
+/// Writes the results in place of the pictures of the first input.
+void write(const Options& o, const ImagePlace& place, std::vector<Denoised>& all, ProgressLine& progress) {
   progress.begin("writing");
-  std::map<std::string, std::string> attributes = inherited_attributes(o.inputs);
-  attributes["covary:version"] = COVARY_VERSION;
-  attributes["covary:command"] = command_line();
-  attributes["covary:estimator"] = request.estimator.text;
-  if (!request.estimator.network.empty()) attributes["covary:denoiser"] = request.estimator.network;
-  if (file.samples() > 0) attributes["covary:samples"] = fmt::to_string(file.samples());
-  write(o, file.place(), attributes, combined.image, std::move(combined.layers), file.source(), progress);
-  write_statistics(o, request, combined, choice);
-  if (o.quiet) return;
-  fmt::print(stderr, "{}: {} x {}, {} of {} groups, {}, in {:.2f} s\n", o.output, file.width(), file.height(),
-             request.estimator.text, file.groups(), guides.text(), combined.check_seconds + combined.estimate_seconds);
-  print_risks(combined, choice);
+  std::vector<ResultPicture> pictures;
+  for (Denoised& one : all) pictures.push_back(std::move(one.result));
+  const std::vector<std::string> lost =
+      pictures.size() == 1
+          ? write_result(o.output, place, all[0].attributes, pictures[0].image, pictures[0].aovs, pictures[0].source)
+          : write_results(o.output, all[0].attributes, pictures);
+  progress.finish();
+  for (const std::string& what : lost) fmt::print(stderr, "warning: {}\n", printable(what));
+  std::string json;  // an object and line for each picture
+  for (const Denoised& one : all) json += json_text(one.json, all.size() == 1 ? 2 : -1);
+  if (!o.json.empty()) write_text_output(o.json, json);
+  for (const Denoised& one : all)
+    if (!o.quiet) one.report();
 }
 
 /// Whether the options select the network alone, whatever the image.
@@ -232,7 +268,8 @@ void check_options(const Options& o) {
     usage("--clean-guides is an option of --mode oidn; mixtures always denoise their guides first");
 }
 
-void run_one(const Options& o) {
+/// Returns what to say about the result.
+std::string run_one(const Options& o) {
   check_options(o);
   Outputs outputs;
   outputs.reads(o.inputs);
@@ -240,38 +277,48 @@ void run_one(const Options& o) {
   outputs.writes("--json", o.json, OutputKind::kText);
   ProgressLine progress(std::filesystem::path(o.inputs[0]).stem().string(), o.quiet);
   progress.begin("loading");
-  std::optional<GroupedFile> file;
-  if (!is_by_network(o)) file.emplace(o.inputs, o.layer);
-  const GuideLayers guides(o, file ? file->colours() : ImageRows(o.inputs[0], o.layer).colours());
-  if (file && file->groups() < 2 && !o.mode.empty())
-    throw Error(ErrorCode::kUsage, fmt::format("--mode {} needs a second render of another seed, or a film with two "
-                                               "groups or more (--groups); '{}' has one",
-                                               o.mode, o.inputs[0]));
-  if (!o.layers.empty() && (!file || file->groups() < 2))
-    throw Error(ErrorCode::kUsage, "--layers are denoised by a mixture, which needs a second render of another seed");
-  if (!o.json.empty() && (!file || file->groups() < 2))
-    throw Error(ErrorCode::kUsage, "--json tells the error, which needs a second render of another seed");
-  if (!file || file->groups() < 2) return denoise_by_network(o, guides, progress);
-  denoise_by_mixture(o, *file, guides, progress);
+  ImagePlace place;
+  std::vector<Denoised> all;
+  for (const Task& task : tasks_of(o)) {
+    std::optional<GroupedFile> file;
+    if (!is_by_network(o)) file.emplace(o.inputs, task.layer);
+    const bool is_mixture = file && file->groups() > 1;
+    if (file && !is_mixture && !o.mode.empty())
+      throw Error(ErrorCode::kUsage, fmt::format("--mode {} needs a second render of another seed, or a film with two "
+                                                 "groups or more (--groups); '{}' has one",
+                                                 o.mode, o.inputs[0]));
+    if (!o.layers.empty() && !is_mixture)
+      throw Error(ErrorCode::kUsage, "--layers are denoised by a mixture, which needs a second render of another seed");
+    if (!o.json.empty() && !is_mixture)
+      throw Error(ErrorCode::kUsage, "--json tells the error, which needs a second render of another seed");
+    place = file ? file->place() : inspect_image(o.inputs[0]).place;
+    all.push_back(is_mixture ? denoise_by_mixture(o, task, *file, progress) : denoise_by_network(o, task, progress));
+  }
+  write(o, place, all, progress);
+  const std::optional<PredictedError>& error = all[0].predicted;
+  return o.output + (error ? fmt::format(", predicted relMSE {:.3g}", error->relmse) : "");
 }
 
 void run_sequence(const Options& o, const FramePatterns& patterns) {
   if (!o.json.empty() && o.json != "-" && !is_frame_pattern(o.json))
     throw Error(ErrorCode::kUsage, fmt::format("--json '{}': of frames, expected a name with '#', or -", o.json));
-  for_each_frame(o.of_frames, patterns, !is_by_network(o), [&](int frame, std::shared_ptr<const History> history) {
+  FrameOptions of_frames = o.of_frames;
+  of_frames.quiet = o.quiet;
+  for_each_frame(of_frames, patterns, !is_by_network(o), [&](int frame, std::shared_ptr<const History> history) {
     Options one = o;
     one.output = frame_name(o.output, frame);
     if (is_frame_pattern(o.json)) one.json = frame_name(o.json, frame);
     for (std::string& path : one.inputs) path = frame_name(path, frame);
     one.history = std::move(history);
-    run_one(one);
+    one.quiet = true;
+    return run_one(one);
   });
 }
 
 void run(const Options& o) {
   if (o.check) return check(o);
-  const FramePatterns patterns{o.inputs, {}, o.output, o.layer};
-  are_frames(o.of_frames, patterns) ? run_sequence(o, patterns) : run_one(o);
+  const FramePatterns patterns{o.inputs, {}, o.output, o.choice};
+  are_frames(o.of_frames, patterns) ? run_sequence(o, patterns) : static_cast<void>(run_one(o));
 }
 
 }  // namespace
@@ -284,8 +331,7 @@ void add_denoise(CLI::App& app) {
             "renders that differ only in their seed, or a film with groups, give a better image and its error")
       ->expected(1, 1000);
   add_value(*command, "-o,--output", o->output, kFileValue, "The result (EXR)");
-  add_value(*command, "--layer", o->layer, "LAYER",
-            "Layer of the picture, e.g. a view or a view layer, if the files hold several");
+  add_picture_options(*command, o->choice, "Denoise", "default: all pictures of the files");
   std::vector<std::string> modes = {kNetwork};
   modes.insert(modes.end(), denoise_mode_names().begin() + 1, denoise_mode_names().end());
   command
@@ -301,8 +347,10 @@ void add_denoise(CLI::App& app) {
             "Layer or file of the albedo; default: by the renderer's usual name");
   add_value(*command, "--normal", o->normal, "LAYER|FILE",
             "Layer or file of the normals, from -1 to 1; default: likewise");
-  add_value(*command, "--layers", o->layers, "LAYER",
-            "Layers of the inputs to denoise with the picture's weights; with Rest, they add up to it")
+  add_value(
+      *command, "--layers", o->layers, "LAYER",
+      "Layers of the inputs to denoise with the picture's weights, so that with Rest they add up to it; 'all': those "
+      "of lights, and of direct and indirect light, that Blender and Arnold write")
       ->delimiter(',');
   command->add_flag("--no-guides", o->no_guides, "Do not use guides");
   command->add_flag(

@@ -6,17 +6,24 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
 #include <optional>
 #include <set>
 #include <string_view>
+#include <thread>
 
 #include "combine/grouped_file.h"
 #include "combine/grouped_source.h"
 #include "core/error.h"
 #include "core/number_text.h"
+#include "core/printable.h"
+#include "core/stopwatch.h"
 #include "declared_options.h"
 #include "estimators/mean.h"
 #include "film/image_file.h"
+#include "imageio/exr_image.h"
 #include "sequences/frame_names.h"
 
 namespace covary {
@@ -164,6 +171,10 @@ void add_frame_options(CLI::App& command, FrameOptions& o, const std::string& wh
   add_value(command, "--depth", o.motion.depth, "LAYER", "Layer with the depth, if any")->capture_default_str();
   add_value(command, "--motion-scale", o.motion_scale, "X,Y",
             "Factors that turn motion into pixels to the right and down; 1,-1 if Y points up");
+  command.add_flag("--resume", o.resume, "Of in_####.exr, leave out frames whose output is there already");
+  command.add_flag("--watch", o.watch,
+                   "Of in_####.exr, wait for frames and treat each when its files are complete, until all of --frames "
+                   "are done or Ctrl-C");
   command.add_flag("--no-history", o.no_history, what + " each frame alone");
 }
 
@@ -187,6 +198,8 @@ bool are_frames(const FrameOptions& o, const FramePatterns& patterns) {
   motion_source(o);  // reports an invalid --motion-scale before any file is read
   if (patterns.images.empty() || !is_frame_pattern_of_input(patterns.images[0])) {
     if (!o.frames.empty()) usage("--frames: the input has no '#' for the frame's number");
+    if (o.resume) usage("--resume: the input has no '#' for the frame's number");
+    if (o.watch) usage("--watch: the input has no '#' for the frame's number");
     return false;
   }
   for (const std::string& path : patterns.images)
@@ -197,46 +210,181 @@ bool are_frames(const FrameOptions& o, const FramePatterns& patterns) {
   return true;
 }
 
-void for_each_frame(const FrameOptions& o, const FramePatterns& patterns, bool has_history,
-                    const std::function<void(int frame, std::shared_ptr<const History> history)>& run) {
-  const MotionSource source = motion_source(o);
-  const std::string& images = patterns.images[0];
-  const std::vector<int> frames = frames_of_all(o, patterns);
-  check_frames(frames, patterns);
-  const bool wants_history = has_history && !o.no_history && frames.size() > 1;
-  const std::optional<std::string> motion = wants_history ? motion_pattern(source, patterns, frames[0]) : std::nullopt;
-  if (wants_history && !motion)
-    fmt::print(stderr, "note: the frames have no layer '{}' (--motion); each is treated alone, without history\n",
-               source.motion);
-  std::optional<int> last;  // the frame before, if it succeeded
-  std::vector<int> failed;
-  for (const int frame : frames) {
+namespace {
+
+/// Runs of consecutive numbers: "1-4, 7".
+std::string text_of(const std::vector<int>& numbers) {
+  std::vector<std::string> runs;
+  for (size_t i = 0, first = 0; i < numbers.size(); ++i)
+    if (i + 1 == numbers.size() || numbers[i + 1] != numbers[i] + 1) {
+      runs.push_back(first == i ? fmt::to_string(numbers[i]) : fmt::format("{}-{}", numbers[first], numbers[i]));
+      first = i + 1;
+    }
+  return fmt::format("{}", fmt::join(runs, ", "));
+}
+
+/// Tells what a user may not expect: gaps between frames, and files that look like frames but are none.
+void note_gaps(const FrameOptions& o, const std::vector<int>& frames, const FramePatterns& patterns) {
+  constexpr size_t kMostNamed = 3;
+  if (o.quiet || !o.frames.empty()) return;
+  std::vector<int> missing;
+  for (size_t i = 1; i < frames.size(); ++i)
+    for (int frame = frames[i - 1] + 1; frame < frames[i]; ++frame) missing.push_back(frame);
+  if (!missing.empty() && missing.size() < frames.size())
+    fmt::print(stderr, "note: '{}' has no frames {}\n", patterns.images[0], text_of(missing));
+  for (const std::string& pattern : patterns.images) {
+    std::vector<std::string> others;
+    frames_on_disk(pattern, &others);
+    if (others.empty()) continue;
+    const size_t more = others.size() - std::min(others.size(), kMostNamed);
+    others.resize(others.size() - more);
+    fmt::print(stderr, "note: {}{} beside '{}' are not its frames: numbers have other digits\n",
+               fmt::join(others, ", "), more > 0 ? fmt::format(" and {} more", more) : "", pattern);
+  }
+}
+
+/// The layer whose history is used; none if there are several pictures.
+std::optional<std::string> layer_with_history(const FramePatterns& patterns, int frame) {
+  const std::string path = frame_name(patterns.images[0], frame);
+  const std::vector<ExrFile::Channel> channels = inspect_image(path).channels;
+  const std::vector<Picture> pictures =
+      is_unnamed(patterns.choice) ? find_pictures(channels) : chosen_pictures(path, channels, patterns.choice);
+  if (pictures.size() > 1) return std::nullopt;
+  return pictures.empty() ? "" : pictures[0].layer;
+}
+
+/// What the history of frames is read from.
+struct HistorySource {
+  std::optional<std::string> motion;  ///< pattern of the files with motion; none: there is no history
+  std::string layer;                  ///< of the pictures
+
+  HistorySource(const FrameOptions& o, const FramePatterns& patterns, const std::vector<int>& frames,
+                bool has_history) {
+    if (!has_history || o.no_history || frames.size() < 2) return;
+    const MotionSource source = motion_source(o);
+    motion = motion_pattern(source, patterns, frames[0]);
+    const std::optional<std::string> only = layer_with_history(patterns, frames[0]);
+    if (!motion && !o.quiet)
+      fmt::print(stderr, "note: the frames have no layer '{}' (--motion); each is treated alone, without history\n",
+                 source.motion);
+    else if (!only && !o.quiet)
+      fmt::print(stderr, "note: the frames have several pictures; each is treated alone, without history\n");
+    if (!only) motion.reset();
+    layer = only.value_or("");
+  }
+};
+
+std::shared_ptr<const History> history_of(const HistorySource& from, const MotionSource& source,
+                                          const FramePatterns& patterns, int frame) {
+  const std::string before = frame_name(patterns.images[0], frame - 1), now = frame_name(patterns.images[0], frame);
+  const MotionLayers layers = read_motion(frame_name(*from.motion, frame), source);
+  const MotionLayers old = read_motion(frame_name(*from.motion, frame - 1), source);
+  check_seeds(before, now);
+  check_motion(before, now, from.layer, layers);
+  const PlacedImage earlier =
+      read_image(frame_name(patterns.output, frame - 1), from.layer, ChecksumPolicy::kCheck, std::nullopt);
+  return std::make_shared<History>(reproject(earlier.image, old.depth, layers));
+}
+
+/// Runs frames, and remembers what became of them.
+class Frames {
+ public:
+  using Run = std::function<std::string(int frame, std::shared_ptr<const History> history)>;
+
+  Frames(const FrameOptions& o, const FramePatterns& patterns, const std::vector<int>& frames, bool has_history,
+         const Run& run)
+      : o_(o), patterns_(patterns), run_(run), source_(motion_source(o)), history_(o, patterns, frames, has_history) {}
+
+  bool is_there(int frame) const { return std::filesystem::exists(frame_name(patterns_.output, frame)); }
+
+  /// `which`: "frame 3 (3 of 8)". Returns false if the frame failed.
+  bool add(int frame, const std::string& which) {
+    if (o_.resume && is_there(frame)) {
+      kept_.push_back(frame);
+      last_ = frame;
+      return true;
+    }
     try {
-      std::shared_ptr<const History> history;
-      if (motion && last == frame - 1) {
-        const std::string before = frame_name(images, *last), now = frame_name(images, frame);
-        const MotionLayers layers = read_motion(frame_name(*motion, frame), source);
-        const MotionLayers old = read_motion(frame_name(*motion, *last), source);
-        check_seeds(before, now);
-        check_motion(before, now, patterns.layer, layers);
-        const PlacedImage earlier =
-            read_image(frame_name(patterns.output, *last), patterns.layer, ChecksumPolicy::kCheck, std::nullopt);
-        history = std::make_shared<History>(reproject(earlier.image, old.depth, layers));
-      }
-      run(frame, std::move(history));
-      last = frame;
+      const bool has_before = history_.motion && last_ == frame - 1;
+      const std::string said = run_(frame, has_before ? history_of(history_, source_, patterns_, frame) : nullptr);
+      if (!o_.quiet) fmt::print(stderr, "{}: {}\n", which, said);
+      last_ = frame;
+      ++n_done_;
+      return true;
     } catch (const WrongSequence&) {
       throw;
     } catch (const Error& error) {
-      if (error.code() != ErrorCode::kInput || frames.size() == 1) throw;
-      fmt::print(stderr, "warning: frame {} failed: {}\n", frame, error.what());
-      failed.push_back(frame);
-      last.reset();
+      if (error.code() != ErrorCode::kInput) throw;
+      fmt::print(stderr, "warning: {} failed: {}\n", which, printable(error.what()));
+      failed_.push_back(frame);
+      last_.reset();
+      return false;
     }
   }
-  if (!failed.empty())
-    throw Error(ErrorCode::kInput,
-                fmt::format("{} of {} frames failed: {}", failed.size(), frames.size(), fmt::join(failed, ", ")));
+
+  /// The summary; throws Error(kInput) if frames failed.
+  void finish() const {
+    if (!o_.quiet)
+      fmt::print(stderr, "{} frames in {:.1f} s{}\n", n_done_, watch_.seconds(),
+                 kept_.empty() ? "" : fmt::format("; {} were there already: {}", kept_.size(), text_of(kept_)));
+    if (!failed_.empty())
+      throw Error(ErrorCode::kInput, fmt::format("{} of {} frames failed: {}", failed_.size(),
+                                                 n_done_ + kept_.size() + failed_.size(), text_of(failed_)));
+  }
+
+ private:
+  const FrameOptions& o_;
+  const FramePatterns& patterns_;
+  const Run& run_;
+  const MotionSource source_;
+  const HistorySource history_;
+  const Stopwatch watch_;
+  std::optional<int> last_;  // the frame before, if it succeeded
+  size_t n_done_ = 0;
+  std::vector<int> failed_, kept_;
+};
+
+/// Whether all files of a frame are there, complete, and not changed for a while.
+bool is_ready(const FramePatterns& patterns, int frame) {
+  constexpr std::chrono::seconds kSettled(2);
+  return std::all_of(patterns.images.begin(), patterns.images.end(), [&](const std::string& pattern) {
+    const std::string path = frame_name(pattern, frame);
+    std::error_code error;
+    const auto written = std::filesystem::last_write_time(path, error);
+    return !error && std::filesystem::file_time_type::clock::now() - written > kSettled && is_complete_exr(path);
+  });
+}
+
+/// Waits for frames and runs those that are ready and not done, until all of --frames are.
+void watch_frames(const FrameOptions& o, const FramePatterns& patterns, bool has_history, const Frames::Run& run) {
+  const std::vector<int> wanted = o.frames.empty() ? std::vector<int>() : frames_of(o.frames, patterns.images[0]);
+  std::set<int> seen;
+  std::optional<Frames> frames;
+  if (!o.quiet) fmt::print(stderr, "waiting for frames '{}'; Ctrl-C ends\n", patterns.images[0]);
+  while (wanted.empty() || seen.size() < wanted.size()) {
+    for (const int frame : wanted.empty() ? frames_on_disk(patterns.images[0]) : wanted) {
+      if (seen.contains(frame) || !is_ready(patterns, frame)) continue;
+      seen.insert(frame);
+      if (!frames) frames.emplace(o, patterns, std::vector{frame, frame + 1}, has_history, run);
+      frames->add(frame, fmt::format("frame {}", frame));
+    }
+    std::this_thread::sleep_for(std::chrono::seconds(1));
+  }
+  frames->finish();
+}
+
+}  // namespace
+
+void for_each_frame(const FrameOptions& o, const FramePatterns& patterns, bool has_history,
+                    const std::function<std::string(int frame, std::shared_ptr<const History> history)>& run) {
+  if (o.watch) return watch_frames(o, patterns, has_history, run);
+  const std::vector<int> numbers = frames_of_all(o, patterns);
+  check_frames(numbers, patterns);
+  note_gaps(o, numbers, patterns);
+  Frames frames(o, patterns, numbers, has_history, run);
+  for (size_t i = 0; i < numbers.size(); ++i)
+    frames.add(numbers[i], fmt::format("frame {} ({} of {})", numbers[i], i + 1, numbers.size()));
+  frames.finish();
 }
 
 }  // namespace covary

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "denoising/history.h"
+#include "film/pictures.h"
 #include "sequences/motion_file.h"
 
 namespace covary {
@@ -17,10 +18,10 @@ namespace covary {
 struct FrameOptions {
   std::string frames, motion_scale;
   MotionSource motion;
-  bool no_history = false;
+  bool no_history = false, resume = false, watch = false, quiet = false;
 };
 
-/// --frames, --motion, --depth, --motion-scale, --no-history. `what`: "Denoise".
+/// --frames, --resume, --watch, --motion, --depth, --motion-scale, --no-history. `what`: "Denoise".
 void add_frame_options(CLI::App& command, FrameOptions& options, const std::string& what);
 
 /// The frame numbers of --frames or, if that is empty, those of the pattern's existing files. Throws Error(kUsage), and
@@ -35,20 +36,21 @@ struct FramePatterns {
   std::vector<std::string> images;  ///< each with its own samples
   std::vector<std::string> others;  ///< that may contain motion, too, or may not be patterns
   std::string output;
-  std::string layer;  ///< of the first image
+  PictureChoice choice;  ///< in the first image
 };
 
 /// Whether the first image is a pattern. Throws Error(kUsage) if other images or the output are not, or for options of
 /// single images.
 bool are_frames(const FrameOptions& options, const FramePatterns& patterns);
 
-/// Calls `run` with the number of each frame, and the history of the previous frame if that was run just before. The
-/// motion comes from the first file that has the layer; without any, there is no history. Before the first frame,
-/// throws Error(kInput) if any file is missing or unreadable, or differs in size or channels from the first frame's. A
-/// frame whose call throws Error(kInput) is reported and left out; the next one starts a new history; Error(kInput)
-/// names such frames in the end. Throws Error(kInput) at once if the motion does not match the frames, or if frames
-/// share a seed, because their samples could not reveal the shared errors.
+/// Calls `run` with the number of each frame, and the history of the previous frame if that was run just before; it
+/// returns what to say about the frame. Prints a line for each frame, and one for all in the end. The motion comes from
+/// the first file that has the layer; without any, and for files with several pictures, there is no history. Before the
+/// first frame, throws Error(kInput) if files are missing, unreadable, or of another size or channels than the first
+/// frame's. A frame whose call throws Error(kInput) is reported and left out; the next one starts a new history;
+/// Error(kInput) names such frames in the end. With --watch, waits for frames until all are there. Throws Error(kInput)
+/// at once if the motion does not match the frames, or if frames share a seed, which hides shared errors.
 void for_each_frame(const FrameOptions& options, const FramePatterns& patterns, bool has_history,
-                    const std::function<void(int frame, std::shared_ptr<const History> history)>& run);
+                    const std::function<std::string(int frame, std::shared_ptr<const History> history)>& run);
 
 }  // namespace covary

@@ -5,29 +5,35 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <span>
 
 #include "core/error.h"
-#include "denoising/denoise.h"
+#include "core/printable.h"
+#include "film/film_file.h"
 #include "metrics/alignment.h"
 
 namespace covary {
 namespace {
 
 /// Last parts of layer names; layers that see through mirrors and glass come first. Sources: docs/other-renderers.md.
-constexpr std::array<std::string_view, 7> kAlbedo = {
+constexpr std::array<std::string_view, 8> kAlbedo = {
     "DenoisingAlbedo",   // covary --aovs
     "Denoising Albedo",  // Blender
     "denoise_albedo",    // Arnold
+    "Denoise Albedo",    // Octane
     "Albedo",            // covary, pbrt-v4
-    "albedo",            // Mitsuba 3 by our example, RenderMan
+    "albedo",            // Mitsuba 3 by our example, RenderMan, Karma
     "ALBEDO",            // LuxCore
     "VRayDiffuseFilter"  // V-Ray
 };
-constexpr std::array<std::string_view, 9> kNormal = {
+constexpr std::array<std::string_view, 10> kNormal = {
     "DenoisingNormal",     // covary --aovs
     "Denoising Normal",    // Blender
+    "Denoise Normal",      // Octane
     "Ns",                  // shading normal
     "N",                   // geometric normal
     "sh_normal",           // Mitsuba 3
@@ -43,21 +49,28 @@ constexpr std::array<std::string_view, 3> kPosition = {
     "position"   // Mitsuba 3 by our example
 };
 
-bool has_three_channels(const ImageInfo& info, const std::string& layer) {
-  return std::count_if(info.channels.begin(), info.channels.end(), [&](const ExrFile::Channel& c) {
-           return c.name.starts_with(layer + ".") && c.name.find('.', layer.size() + 1) == std::string::npos;
-         }) == 3;
+bool has_three_channels(const std::string& path, const ImageInfo& info, const std::string& layer) {
+  const std::vector<std::string> names = layer_channels(path, info.channels, layer);
+  return names[0] != names[2];
 }
 
-/// Whether the layer may show the same view as the picture: "left.N" and "N", but not "right.N", for "left"; and
-/// "ViewLayer.Normal" for "ViewLayer.Combined".
-bool is_of(const std::string& picture, const std::string& layer) {
-  const auto folder = [](const std::string& name) {
-    const size_t dot = name.rfind('.');
-    return dot == std::string::npos ? std::string() : name.substr(0, dot);
-  };
-  const std::string of_layer = folder(layer);
-  return of_layer.empty() || of_layer == picture || of_layer == folder(picture);
+/// Reports the first value that is not finite, and makes all such pixels NaN.
+void leave_out_bad_pixels(const std::string& name, Image& guide) {
+  size_t n = 0;
+  std::string first;
+  for (size_t i = 0; i < guide.data.size(); i += 3) {
+    float* pixel = &guide.data[i];
+    const float* bad = std::find_if(pixel, pixel + 3, [](float v) { return !std::isfinite(v); });
+    if (bad == pixel + 3) continue;
+    if (n++ == 0) {
+      const auto at = static_cast<int>(i / 3);
+      first = fmt::format("{} at ({}, {})", *bad, at % guide.width, at / guide.width);
+    }
+    std::fill_n(pixel, 3, std::numeric_limits<float>::quiet_NaN());
+  }
+  if (n > 0)
+    fmt::print(stderr, "warning: {}: {} of {} pixels of this guide are left out, the first with the value {}\n",
+               printable(name), n, guide.data.size() / 3, first);
 }
 
 /// The space to convert a guide to; none for vectors, even if their components are called R, G and B.
@@ -65,9 +78,9 @@ std::optional<ColourSpace> space_of(GuideKind kind, const ColourSpace& colours) 
   return kind == GuideKind::kAlbedo ? std::optional(colours) : std::nullopt;
 }
 
-Image checked_guide(const std::string& path, const std::string& layer, const std::optional<ColourSpace>& colours) {
+Image usable_guide(const std::string& path, const std::string& layer, const std::optional<ColourSpace>& colours) {
   Image guide = read_image(path, layer, ChecksumPolicy::kCheck, colours).image;
-  check_guide(path + (layer.empty() ? "" : ": the layer " + layer), guide);
+  leave_out_bad_pixels(path + (layer.empty() ? "" : ": the layer " + layer), guide);
   return guide;
 }
 
@@ -80,21 +93,21 @@ Image guide_from_file(const std::string& path, const ImagePlace& place, const st
     throw Error(ErrorCode::kInput, fmt::format("'{}' has the pixels {}; '{}' needs {}", file,
                                                text_of(guide.place.window), path, text_of(place.window)));
   Image pixels = cut(std::move(guide), place.window);
-  check_guide(file, pixels);
+  leave_out_bad_pixels(file, pixels);
   return pixels;
 }
 
 }  // namespace
 
 std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, GuideKind kind,
-                                const ColourSpace& colours, const std::string& picture) {
-  std::vector<std::string> layers = image_layers(info.channels);
-  if (!picture.empty()) std::erase_if(layers, [&](const std::string& layer) { return !is_of(picture, layer); });
+                                const ColourSpace& colours, const Picture& picture) {
   const std::span<const std::string_view> all[] = {kAlbedo, kNormal, kPosition};
+  const std::vector<std::string> layers = image_layers(info.channels);
   for (const std::string_view name : all[static_cast<int>(kind)])
     for (const std::string& layer : layers)
-      if (last_part(layer) == name && has_three_channels(info, layer))
-        return checked_guide(path, layer, space_of(kind, colours));
+      if (last_part(without_view(layer, view_of(layer, info.channels))) == name &&
+          belongs_to(picture, layer, info.channels) && has_three_channels(path, info, layer))
+        return usable_guide(path, layer, space_of(kind, colours));
   return std::nullopt;
 }
 
@@ -104,7 +117,86 @@ Image named_guide(const std::string& path, const ImageInfo& info, GuideKind kind
   const bool is_layer = std::find(layers.begin(), layers.end(), layer_or_file) != layers.end();
   if (!is_layer && std::filesystem::exists(layer_or_file))
     return guide_from_file(path, info.place, layer_or_file, space_of(kind, colours));
-  return checked_guide(path, layer_or_file, space_of(kind, colours));  // its error lists the layers
+  return usable_guide(path, layer_or_file, space_of(kind, colours));  // its error lists the layers
+}
+
+std::optional<Image> filled(std::optional<Image> guide) {
+  if (guide)
+    std::replace_if(
+        guide->data.begin(), guide->data.end(), [](float v) { return std::isnan(v); }, 0.0f);
+  return guide;
+}
+
+void MeanGuide::add(const std::string& path, std::optional<Image> image) {
+  if (!image) return;
+  if (!sum_) sum_ = Image(image->width, image->height, 3), n_.resize(image->data.size() / 3);
+  if (sum_->data.size() != image->data.size() || sum_->width != image->width)
+    throw Error(ErrorCode::kInput, fmt::format("'{}' has {} x {} pixels, others have {} x {}", path, image->width,
+                                               image->height, sum_->width, sum_->height));
+  for (size_t i = 0; i < n_.size(); ++i) {
+    if (std::isnan(image->data[3 * i])) continue;
+    ++n_[i];
+    for (size_t c = 3 * i; c < 3 * i + 3; ++c) sum_->data[c] += image->data[c];
+  }
+}
+
+std::optional<Image> MeanGuide::mean() const {
+  std::optional<Image> mean = sum_;
+  for (size_t i = 0; i < n_.size(); ++i)
+    for (size_t c = 3 * i; n_[i] > 1 && c < 3 * i + 3; ++c) mean->data[c] /= n_[i];
+  return mean;
+}
+
+GuideImages read_guides(const std::string& path, const ImagePlace& place, const ColourSpace& colours) {
+  const ImageInfo info = inspect_image(path);
+  const auto own = [&](const char* name, GuideKind kind) -> std::optional<Image> {  // guides that `render` wrote
+    const bool is_there = std::any_of(info.channels.begin(), info.channels.end(),
+                                      [&](const auto& c) { return c.name.starts_with(std::string(name) + "."); });
+    return is_there ? filled(named_guide(path, info, kind, colours, name)) : std::nullopt;
+  };
+  const auto find = [&](GuideKind kind) { return filled(find_guide(path, info, kind, colours)); };
+  GuideImages guides{own("Albedo", GuideKind::kAlbedo),
+                     own("N", GuideKind::kNormal),
+                     own("DenoisingAlbedo", GuideKind::kAlbedo),
+                     own("DenoisingNormal", GuideKind::kNormal),
+                     info.attributes.contains(std::string("covary:") + film_key::kCleanGuides),
+                     find(GuideKind::kPosition)};
+  if (!guides.albedo) guides.albedo = find(GuideKind::kAlbedo);
+  if (!guides.normal) guides.normal = find(GuideKind::kNormal);
+  if (!guides.albedo)
+    throw Error(ErrorCode::kInput,
+                fmt::format("--guides '{}' has no layer Albedo (Albedo.R, .G, .B) under any known name", path));
+  if (const CropWindow& there = info.place.window, &here = place.window; !(info.place == place))
+    throw Error(ErrorCode::kInput,
+                fmt::format("--guides '{}' has the pixels {}, the images {}, or another frame around them", path,
+                            text_of(there), text_of(here)));
+  return guides;
+}
+
+GuideLayers::GuideLayers(const GuideSearch& search) {
+  if (search.none) return;
+  MeanGuide of_albedo, of_normal, of_position;
+  for (const std::string& path : search.files) {
+    const ImageInfo info = inspect_image(path);
+    const auto guide = [&](const std::string& name, GuideKind kind) -> std::optional<Image> {
+      if (name.empty()) return find_guide(path, info, kind, search.colours, search.picture);
+      return named_guide(path, info, kind, search.colours, name);
+    };
+    of_albedo.add(path, guide(search.albedo, GuideKind::kAlbedo));
+    of_normal.add(path, guide(search.normal, GuideKind::kNormal));
+    of_position.add(path, guide("", GuideKind::kPosition));
+  }
+  albedo = of_albedo.mean(), normal = of_normal.mean(), position = of_position.mean();
+  if (!albedo) normal.reset();  // Open Image Denoise only takes normals together with an albedo
+}
+
+Guides GuideLayers::view() const {
+  const auto or_null = [](const std::optional<Image>& image) { return image ? &*image : nullptr; };
+  return {or_null(albedo), or_null(normal), nullptr, nullptr, or_null(position)};
+}
+
+const char* GuideLayers::text() const {
+  return normal ? "guided by albedo and normal" : albedo ? "guided by albedo" : "without guides";
 }
 
 }  // namespace covary

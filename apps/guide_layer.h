@@ -2,10 +2,13 @@
 // Layers of an image that guide a denoiser, by each renderer's names.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "film/image_file.h"
+#include "estimators/estimator.h"
+#include "film/pictures.h"
 
 namespace covary {
 
@@ -13,16 +16,67 @@ namespace covary {
 /// first one.
 enum class GuideKind { kAlbedo, kNormal, kPosition };
 
-/// The guide layer of the image at `path` by the renderers' names (table in docs/other-renderers.md); if there are
-/// several, the first in the table. An albedo is converted to `colours`, the picture's space. `picture`: the picture's
-/// layer, to which layers of other views do not belong. Throws like read_image() and check_guide().
+/// The guide layer of the image at `path` by the renderers' names (table in docs/other-renderers.md), of the picture's
+/// view and view layer; if there are several, the first in the table. An albedo is converted to `colours`, the space of
+/// the picture. Pixels with values that are not finite are told as a warning, and become NaN. Throws like
+/// read_image().
 std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, GuideKind kind,
-                                const ColourSpace& colours, const std::string& picture = "");
+                                const ColourSpace& colours, const Picture& picture = {});
 
-/// A guide named by the user: a layer of the image at `path`, or a separate file, whose frame must have the same size;
-/// of a larger data window, the pixels of the image. An albedo is converted to `colours`. Throws like read_image(),
-/// check_guide() and common_window().
+/// A guide named by the user, likewise: a layer of the image at `path`, or a separate file, whose frame must have the
+/// same size; of a larger data window, the pixels of the image. Throws like read_image() and common_window().
 Image named_guide(const std::string& path, const ImageInfo& info, GuideKind kind, const ColourSpace& colours,
                   const std::string& layer_or_file);
+
+/// The image with 0 in place of NaN.
+std::optional<Image> filled(std::optional<Image> guide);
+
+/// The mean of images, in which pixels that are NaN count as missing; 0 where all are.
+class MeanGuide {
+ public:
+  /// Throws Error(kInput), naming the file, if the size differs.
+  void add(const std::string& path, std::optional<Image> image);
+  std::optional<Image> mean() const;
+
+ private:
+  std::optional<Image> sum_;
+  std::vector<uint16_t> n_;  // of each pixel
+};
+
+/// The layers of --guides.
+struct GuideImages {
+  std::optional<Image> albedo, normal;                      // first hits, if the file has both
+  std::optional<Image> denoising_albedo, denoising_normal;  // first rough surfaces behind mirrors and glass
+  bool clean = false;                                       // without noise, as in covary's own films
+  std::optional<Image> position;
+  Guides view() const {
+    const auto or_null = [](const std::optional<Image>& image) { return image ? &*image : nullptr; };
+    Guides guides{or_null(albedo),           or_null(normal),   or_null(denoising_albedo),
+                  or_null(denoising_normal), or_null(position), clean};
+    if (!albedo) guides.normal = nullptr;
+    return guides;
+  }
+};
+
+/// Throws Error(kInput) if the file has no albedo, or other pixels than `place`.
+GuideImages read_guides(const std::string& path, const ImagePlace& place, const ColourSpace& colours);
+
+/// What finds the guides of a picture in several renders of it.
+struct GuideSearch {
+  std::vector<std::string> files;
+  Picture picture;
+  ColourSpace colours;         ///< of the picture
+  std::string albedo, normal;  ///< layers or files; "": by the renderers' names
+  bool none = false;
+};
+
+/// The guides of a picture, each the mean over the files that have it.
+struct GuideLayers {
+  std::optional<Image> albedo, normal, position;
+
+  explicit GuideLayers(const GuideSearch& search);
+  Guides view() const;
+  const char* text() const;
+};
 
 }  // namespace covary

@@ -9,8 +9,9 @@
 #include "combine/registry.h"
 #include "commands.h"
 #include "core/error.h"
+#include "core/printable.h"
 #include "declared_options.h"
-#include "film/image_file.h"
+#include "film/pictures.h"
 #include "io/load_scene.h"
 #include "io/scene_file.h"
 #include "json_output.h"
@@ -36,7 +37,11 @@ void print_json(const ImageInfo& info, const std::string& path) {
   object["window"] = {w.x, w.y, w.width, w.height};
   object["compression"] = info.compression;
   object["colours"] = info.colours.text();
-  for (const ExrFile::Channel& c : info.channels) object["channels"][c.name] = c.type;
+  for (const auto* channels : {&info.channels, &info.unreadable})
+    for (const ExrFile::Channel& c : *channels) object["channels"][c.name] = c.type;
+  std::vector<std::string> pictures;
+  for (const Picture& picture : find_pictures(info.channels)) pictures.push_back(picture.layer);
+  object["pictures"] = pictures;
   object["attributes"] = info.attributes;
   write_text_output("-", json_text(object, -1));
 }
@@ -52,7 +57,8 @@ std::string describe_channels(const std::vector<ExrFile::Channel>& channels) {
   }
   std::string text;
   for (const auto& [layer, content] : layers)
-    text += fmt::format("  {}{}{} ({})\n", layer, layer.empty() ? "" : ": ", content.first, content.second);
+    text += fmt::format("  {}{}{} ({})\n", printable(layer), layer.empty() ? "" : ": ", printable(content.first),
+                        content.second);
   return text;
 }
 
@@ -95,26 +101,30 @@ void scene_info(const InfoOptions& options) {
 
 void print_text(const ImageInfo& info, const std::string& path) {
   const CropWindow& w = info.place.window;
-  fmt::print("{}: {} x {} pixels", path, w.width, w.height);
+  fmt::print("{}: {} x {} pixels", printable(path), w.width, w.height);
   if (w.x || w.y || w.width != info.place.frame_width || w.height != info.place.frame_height)
     fmt::print(" at ({}, {}) of a frame of {} x {}", w.x, w.y, info.place.frame_width, info.place.frame_height);
   fmt::print(", {}{}{}\n", info.format, info.compression.empty() ? "" : ", compression ", info.compression);
   if (!(info.colours == ColourSpace::rec709())) fmt::print("colours {}\n", info.colours.text());
+  const std::vector<Picture> pictures = find_pictures(info.channels);
+  if (pictures.size() > 1) fmt::print("pictures {}\n", printable(text_of(pictures)));
   fmt::print("channels\n{}", describe_channels(info.channels));
+  if (!info.unreadable.empty())
+    fmt::print("channels that other commands cannot read\n{}", describe_channels(info.unreadable));
   if (!info.attributes.empty()) fmt::print("attributes\n");
-  for (const auto& [name, value] : info.attributes) fmt::print("  {}: {}\n", name, value);
+  for (const auto& [name, value] : info.attributes) fmt::print("  {}: {}\n", printable(name), printable(value));
 }
 
 void info(const InfoOptions& options) {
   if (is_scene_file(options.path)) return scene_info(options);
   if (!options.defines.empty()) throw Error(ErrorCode::kUsage, "-D is for scene files (.xml)");
-  const ImageInfo info = inspect_image(options.path, ChecksumPolicy::kIgnore);
+  const ImageInfo info = describe_image(options.path);
   if (options.json)
     print_json(info, options.path);
   else
     print_text(info, options.path);
   std::fflush(stdout);
-  check_image(options.path);  // last: even the header of a damaged file may help
+  if (!info.channels.empty()) check_image(options.path);  // last: even the header of a damaged file may help
 }
 
 }  // namespace

@@ -19,6 +19,7 @@
 #include "commands.h"
 #include "core/detached_work.h"
 #include "core/error.h"
+#include "core/printable.h"
 #include "core/shell_text.h"
 #include "core/unfinished.h"
 #include "interruption.h"
@@ -45,7 +46,7 @@ void check_standard_output() {
 
 int report(const char* program, const Error& error) {
   std::fprintf(stderr, "%s: %s%s\n", program, error.code() == ErrorCode::kInternal ? "internal error: " : "",
-               as_flags(error.what()).c_str());
+               printable(as_flags(error.what())).c_str());
   if (const auto* unfinished = dynamic_cast<const Unfinished*>(&error)) return unfinished->exit_code();
   return error.code() == ErrorCode::kUsage ? 2 : 1;
 }

@@ -29,6 +29,7 @@
 #include "metrics/alignment.h"
 #include "metrics/metrics.h"
 #include "numbers.h"
+#include "picture_options.h"
 #include "report/report.h"
 #include "risk/predicted_error.h"
 #include "sequences/frame_names.h"
@@ -45,7 +46,8 @@ constexpr size_t kMostLayers = 100;  // of a file
 
 struct ViewOptions {
   std::vector<std::string> images, insets;
-  std::string reference, layer, output, title, frames;
+  std::string reference, output, title, frames;
+  PictureChoice choice;
   double fps = 24;
   bool small = false;
 
@@ -57,6 +59,9 @@ struct Shown {
   std::string path, name;
   PlacedImage source;
   bool is_reference = false;
+  PictureChoice choice = {};
+  std::string layer;
+  std::string id() const { return choice.view.empty() ? path : path + ":" + choice.view; }
 };
 
 constexpr double kPixels = 3 * sizeof(float);  // bytes per pixel
@@ -70,6 +75,8 @@ void name_images(std::vector<Shown>& images) {
     };
     if (std::any_of(images.begin(), images.end(), same)) image.name = image.path;
   }
+  for (Shown& image : images)
+    if (!image.choice.view.empty()) image.name += " " + image.choice.view;
 }
 
 /// The same for frames, named after their sequences: "pt" of "pt_####.exr".
@@ -92,10 +99,12 @@ std::vector<Shown> read_images(const ViewOptions& options) {
   const auto add = [&](const std::string& path, bool is_reference) {
     const auto same = [&](const Shown& image) { return image.path == path; };
     if (std::find_if(images.begin(), images.end(), same) != images.end()) return;
-    // Checked before reading: the page holds two more copies of the image, cropped and encoded.
-    const CropWindow window = inspect_image(path).place.window;
-    require_image_memory(path, window.width, window.height, 3 * kPixels);
-    images.push_back({path, "", read_image(path, options.layer), is_reference});
+    const std::vector<PictureChoice> views = each_view(path, options.choice);
+    const CropWindow window = inspect_image(path).place.window;  // the page holds two more copies, cropped and encoded
+    require_image_memory(path, window.width, window.height, 3 * kPixels * static_cast<double>(views.size()));
+    for (const PictureChoice& view : views)
+      images.push_back({path, "", read_image(path, chosen_layer(path, view)), is_reference && views.size() == 1, view,
+                        chosen_layer(path, view)});
   };
   if (!options.reference.empty()) add(options.reference, true);
   for (const std::string& path : options.images) add(path, false);
@@ -150,7 +159,7 @@ struct Page {
   bool reference_low_range = false;
   std::vector<ReportImage> images;
 
-  nlohmann::ordered_json add(const Shown& image, const std::string& layer);
+  nlohmann::ordered_json add(const Shown& image);
 
  private:
   void add_layers(const Shown& image, const std::string& shown, nlohmann::ordered_json& entry);
@@ -161,7 +170,7 @@ struct Page {
 void Page::add_errors(const Shown& image, const Image& pixels, nlohmann::ordered_json& entry) const {
   if (reference)
     entry["label"] = fmt::format("relMSE {:.3g}", compute_metric(Metric::kRelMse, pixels, {&*reference, 1}).value);
-  const std::string errors = image.path + ":StdError";
+  const std::string errors = image.id() + ":StdError";
   const auto layer = std::find_if(images.begin(), images.end(), [&](const auto& i) { return i.id == errors; });
   if (layer == images.end() || layer->pixels.channels != 3) return;
   std::string predicted = fmt::format("{:.3g}", predicted_relmse({pixels, layer->pixels}));
@@ -195,19 +204,19 @@ void Page::add_layers(const Shown& image, const std::string& shown, nlohmann::or
       for (size_t i = 0; i < grey.data.size(); ++i) grey.data[i] = pixels.data[3 * i];
       pixels = std::move(grey);
     }
-    const std::string id = image.path + ":" + layer;
+    const std::string id = image.id() + ":" + layer;
     entry["layers"].push_back(
         {{"name", layer}, {"image", id}, {"display", display_of(image.path, info.channels, layer)}});
     images.push_back({id, std::move(pixels)});
   }
 }
 
-nlohmann::ordered_json Page::add(const Shown& image, const std::string& layer) {
-  nlohmann::ordered_json entry{{"name", image.name}, {"image", image.path}};
+nlohmann::ordered_json Page::add(const Shown& image) {
+  nlohmann::ordered_json entry{{"name", image.name}, {"image", image.id()}};
   constexpr double kFlip = 150;  // bytes per pixel
   require_image_memory(image.path, window.width, window.height, 2 * kPixels + (reference && !small ? kFlip : 0));
   Image pixels = cut(image.source, window);
-  if (!small) add_layers(image, layer, entry);
+  if (!small) add_layers(image, image.layer, entry);
   if (image.is_reference) {
     entry["role"] = "reference";
     reference = pixels;
@@ -215,15 +224,15 @@ nlohmann::ordered_json Page::add(const Shown& image, const std::string& layer) {
   } else if (reference && !small) {
     const bool low_range = image.source.low_dynamic_range && reference_low_range;
     MetricResult flip = compute_metric(Metric::kFlip, pixels, {&*reference, 1}, low_range);
-    entry["flip"] = image.path + ":FLIP";
-    images.push_back({image.path + ":FLIP", std::move(flip.map)});
+    entry["flip"] = image.id() + ":FLIP";
+    images.push_back({image.id() + ":FLIP", std::move(flip.map)});
   }
   if (image.is_reference)
     entry["label"] = "reference";
   else
     add_errors(image, pixels, entry);
-  const auto is_it = [&](const ReportImage& other) { return other.id == image.path; };  // an image of all frames
-  if (std::none_of(images.begin(), images.end(), is_it)) images.push_back({image.path, std::move(pixels)});
+  const auto is_it = [&](const ReportImage& other) { return other.id == image.id(); };  // an image of all frames
+  if (std::none_of(images.begin(), images.end(), is_it)) images.push_back({image.id(), std::move(pixels)});
   return entry;
 }
 
@@ -262,7 +271,7 @@ nlohmann::ordered_json add_scene(const ViewOptions& options, std::optional<int> 
     if (!(image.source.place.window == page.window))
       fmt::print(stderr, "covary: {}: shown are the pixels in common, {}\n", image.path, text_of(page.window));
   nlohmann::ordered_json entries = nlohmann::ordered_json::array(), insets = nlohmann::ordered_json::array();
-  for (const Shown& image : shown) entries.push_back(page.add(image, options.layer));
+  for (const Shown& image : shown) entries.push_back(page.add(image));
   for (const std::string& inset : options.insets) insets.push_back(parse_inset(inset, page.window));
   return {{"name", names_of(shown)}, {"images", entries}, {"insets", insets}};
 }
@@ -372,7 +381,7 @@ void add_view(CLI::App& app) {
       ->required();
   add_value(*command, "-r,--reference", o->reference, kFileValue, "Show errors relative to this image");
   add_value(*command, "-o,--output", o->output, kFileValue, "Write the page (HTML) here instead of opening it");
-  add_value(*command, "--layer", o->layer, "LAYER", "Show this layer (N, group03, …) instead of R G B");
+  add_picture_options(*command, o->choice, "Show", "default: the picture");
   add_value(*command, "--inset", o->insets, "X,Y,WIDTH,HEIGHT", "Magnify this crop; may be repeated")
       ->take_all()
       ->expected(1)

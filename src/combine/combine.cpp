@@ -165,15 +165,20 @@ void check_denoised(const ImageOrigin& origin, int groups, std::vector<Finding>&
                    origin.name, origin.denoised)});
 }
 
-void report(const std::vector<StrayValue>& strays, const char* name, std::vector<Finding>& findings) {
+/// What messages call the images: with a CRN image, by their roles.
+ImageNames names_of(const ImageOrigin& origin, const char* role) {
+  return {*role ? role : (origin.renders.size() > 1 ? "the renders" : origin.name), origin.renders};
+}
+
+void report(const std::vector<StrayValue>& strays, const ImageNames& names, std::vector<Finding>& findings) {
   if (strays.empty()) return;
   const StrayValue& s = strays.front();
-  findings.push_back(
-      {Finding::Severity::kWarning,
-       fmt::format("{}: {} value{} that outshine{} the whole picture {:.0f} times {} left out, "
-                   "the largest of {:.3g} at ({}, {}) in render {}; find the cause in the renderer",
-                   name, strays.size(), strays.size() == 1 ? "" : "s", strays.size() == 1 ? "s" : "", kMostOfPicture,
-                   strays.size() == 1 ? "is" : "are", s.brightness, s.x, s.y, s.group + 1)});
+  findings.push_back({Finding::Severity::kWarning,
+                      fmt::format("{}: {} value{} that outshine{} the whole picture {:.0f} times {} left out, "
+                                  "the largest of {:.3g} at ({}, {}) in {}; find the cause in the renderer",
+                                  names.image, strays.size(), strays.size() == 1 ? "" : "s",
+                                  strays.size() == 1 ? "s" : "", kMostOfPicture, strays.size() == 1 ? "is" : "are",
+                                  s.brightness, s.x, s.y, names.render(static_cast<size_t>(s.group)))});
 }
 
 /// The source with these values set to NaN.
@@ -218,12 +223,14 @@ InputFindings examine(const CombineRequest& request) {
     crn_seeds.add_rows(g), seeds.add_rows(h);
     of_crn.add_rows(g), of_independent.add_rows(h);
   }
-  inputs.report = checkable ? checks.report() : unchecked_report();
-  crn_seeds.report("CRN", inputs.report.findings), seeds.report("independent image", inputs.report.findings);
-  if (errors_text(inputs.report.findings).empty()) differences.report(inputs.report.findings);
+  const ImageNames crn_names = names_of(crn_origin, "CRN"),
+                   names = names_of(independent.origin, request.crn ? "independent image" : "");
+  inputs.report = checkable ? checks.report(crn_names, names) : unchecked_report();
+  crn_seeds.report(crn_names, inputs.report.findings), seeds.report(names, inputs.report.findings);
+  if (errors_text(inputs.report.findings).empty()) differences.report(names, inputs.report.findings);
   inputs.strays_of_crn = of_crn.found(), inputs.strays = of_independent.found();
-  report(inputs.strays_of_crn, "CRN", inputs.report.findings);
-  report(inputs.strays, "independent image", inputs.report.findings);
+  report(inputs.strays_of_crn, crn_names, inputs.report.findings);
+  report(inputs.strays, names, inputs.report.findings);
   inputs.findings.insert(inputs.findings.end(), inputs.report.findings.begin(), inputs.report.findings.end());
   return inputs;
 }

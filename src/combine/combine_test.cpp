@@ -120,7 +120,8 @@ TEST(Combine, AnIndependentImageAloneIsDenoised) {
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x) std::copy_n(twice.pixel(x, y), 3, twice.pixel(x, y) + 3);
   request.independent = source_of(twice.view(), origin("b.exr"));
-  EXPECT_TRUE(contains(message_of([&] { combine(request); }, ErrorCode::kInput), "renders 1 and 2 are identical"));
+  EXPECT_TRUE(
+      contains(message_of([&] { combine(request); }, ErrorCode::kInput), "render 1 and render 2 are identical"));
 }
 
 TEST(Combine, ErrorsOfTheInputsAreThrownUnlessForced) {

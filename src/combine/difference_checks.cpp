@@ -65,7 +65,7 @@ void DifferenceChecks::add_rows(const GroupedImage& image) {
     }
 }
 
-void DifferenceChecks::report(std::vector<Finding>& findings) const {
+void DifferenceChecks::report(const ImageNames& names, std::vector<Finding>& findings) const {
   for (size_t t = 0; t < pairs_.size(); ++t) {
     const Pair& pair = pairs_[t];
     const double brighter = 0.5 + pair.excess_brighter(), correlation = pair.correlation();
@@ -76,18 +76,18 @@ void DifferenceChecks::report(std::vector<Finding>& findings) const {
     if (is_correlated && brighter < kMostlyBrighter)
       findings.push_back(
           {Finding::Severity::kError,
-           fmt::format("differences of renders {} and {} are correlated {} pixels apart (signs by {:.2f}; noise by 0): "
+           fmt::format("differences of {} and {} are correlated {} pixels apart (signs by {:.2f}; noise by 0): "
                        "they were denoised before, their pixels share random numbers, or they show different scenes, "
                        "lights or exposures (one is brighter in {:.0f} % of the pixels); render both without a "
                        "denoiser, differing only in the seed",
-                       t + 1, t + 2, kDistance, correlation, 100 * brighter)});
+                       names.render(t), names.render(t + 1), kDistance, correlation, 100 * brighter)});
     else if (is_brighter)
       findings.push_back(
           {Finding::Severity::kError,
-           fmt::format("one of the renders {} and {} is brighter in {:.0f} % of the pixels that differ; if only their "
+           fmt::format("one of {} and {} is brighter in {:.0f} % of the pixels that differ; if only their "
                        "seeds differed, it would be one half: exposure, lights or numbers of samples differ, or their "
                        "pixels share random numbers",
-                       t + 1, t + 2, 100 * brighter)});
+                       names.render(t), names.render(t + 1), 100 * brighter)});
     else
       continue;
     return;  // one such pair is enough

@@ -17,7 +17,7 @@ class DifferenceChecks {
   /// The next rows.
   void add_rows(const GroupedImage& image);
   /// Appends an error if renders were already denoised, share random numbers, or one is brighter.
-  void report(std::vector<Finding>& findings) const;
+  void report(const ImageNames& names, std::vector<Finding>& findings) const;
 
  private:
   struct Pair {  ///< a render and the next

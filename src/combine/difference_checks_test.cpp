@@ -18,7 +18,7 @@ std::string findings(const test::Grouped& image) {
   DifferenceChecks checks(image.width, image.height, image.groups);
   for (int y = 0; y < kHeight; y += 40) checks.add_rows(rows_of(image.view(), y, 40));
   std::vector<Finding> found;
-  checks.report(found);
+  checks.report({}, found);
   std::string text;
   for (const Finding& f : found) text += f.text + "\n";
   return text;
@@ -71,7 +71,7 @@ TEST(DifferenceChecks, LooksAtEveryPairOfNeighbours) {
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x)
       for (int c = 0; c < 3; ++c) image.pixel(x, y)[9 + c] *= 1.5f;
-  EXPECT_NE(findings(image).find("renders 3 and 4"), std::string::npos);
+  EXPECT_NE(findings(image).find("render 3 and render 4"), std::string::npos);
 }
 
 }  // namespace

@@ -7,17 +7,19 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 #include "core/error.h"
 #include "core/number_text.h"
 #include "film/denoised_by.h"
-#include "film/image_file.h"
+#include "film/pictures.h"
 #include "film/splat_layer.h"
 
 namespace covary {
 namespace {
 
+constexpr const char* kGroup = "group";                  // layers group00, group01, … of covary's films
 constexpr const char* kCounts = "samples";               // channel in covary's films
 constexpr const char* kVariance = "variance_in_groups";  // channels .R .G .B in some of them
 
@@ -70,38 +72,52 @@ std::string list_layers(const ExrFile& file, const std::vector<ColourLayer>& lay
   return fmt::format("channels in it: {}", fmt::join(names, ", "));
 }
 
-/// Numbered layers STEM0, STEM1, …, ordered by number; `stem` "" means the only stem.
+/// Whether layers STEM0, STEM1, … are groups of samples, if nobody says so: of the name that covary gives them, or the
+/// only layers of colours. Other numbered layers are light groups, mattes or AOVs.
+bool are_groups(const std::string& stem, size_t n, const std::vector<ColourLayer>& layers) {
+  return stem == kGroup || (n == layers.size() && holds_colours(layers[0].channels));
+}
+
+/// Numbered layers STEM0, STEM1, … that are groups of samples, ordered by number; `stem` "" means the only stem.
 std::vector<ColourLayer> numbered_layers(const std::vector<ColourLayer>& layers, const std::string& stem) {
-  std::vector<std::pair<int, const ColourLayer*>> found;
-  std::string first_stem;
-  for (const ColourLayer& layer : layers) {
-    const auto [name, number] = split_number(layer.name);
-    if (number < 0 || (!stem.empty() && name != stem)) continue;
-    if (found.empty()) first_stem = name;
-    if (name != first_stem) return {};
-    found.emplace_back(number, &layer);
+  if (std::any_of(layers.begin(), layers.end(), [&](const ColourLayer& layer) { return layer.name == stem; }) &&
+      !stem.empty())
+    return {};
+  std::map<std::string, std::vector<std::pair<int, const ColourLayer*>>> by_stem;
+  for (const ColourLayer& layer : layers)
+    if (const auto [name, number] = split_number(layer.name); number >= 0) by_stem[name].emplace_back(number, &layer);
+  for (auto& [name, found] : by_stem) {
+    if (stem.empty() ? !are_groups(name, found.size(), layers) : name != stem) continue;
+    std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::vector<ColourLayer> result;
+    for (const auto& [number, layer] : found) result.push_back(*layer);
+    return result;
   }
-  std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  std::vector<ColourLayer> result;
-  for (const auto& [number, layer] : found) result.push_back(*layer);
-  return result;
+  return {};
 }
 
 /// The only image in a file.
-const ColourLayer& single_layer(const std::string& path, const ExrFile& file, const std::vector<ColourLayer>& layers,
-                                const std::string& name) {
-  if (name.empty()) {
-    if (const ColourLayer* picture = find_picture(layers)) return *picture;
-    fail(path, fmt::format("{}; {}",
-                           layers.empty() ? "no image of channels R, G and B" : "several images; name one by its layer",
-                           list_layers(file, layers)));
-  }
+ColourLayer single_layer(const std::string& path, const ExrFile& file, const std::vector<ColourLayer>& layers,
+                         const std::string& name) {
   std::vector<std::string> names;
   for (const ColourLayer& layer : layers) {
     if (layer.name == name) return layer;
     names.push_back(layer.name);
   }
-  fail(path, fmt::format("no image '{}'{}; {}", name, did_you_mean(name, names), list_layers(file, layers)));
+  const std::vector<Picture> pictures = find_pictures(file.channels());
+  for (const Picture& picture : pictures)
+    if (picture.layer == name || (name.empty() && pictures.size() == 1)) return {picture.layer, picture.channels};
+  if (!name.empty() && std::any_of(file.channels().begin(), file.channels().end(),
+                                   [&](const ExrFile::Channel& c) { return c.name == name; }))
+    return {name, {name, name, name}};
+  if (!name.empty())
+    fail(path, fmt::format("no image '{}'{}; {}", name, did_you_mean(name, names), list_layers(file, layers)));
+  if (pictures.size() > 1)
+    fail(path, fmt::format("several pictures, {}; choose one by {}--layer", text_of(pictures),
+                           pictures[0].view.empty() ? "" : "--view or "));
+  fail(path, fmt::format("{}; {}",
+                         layers.empty() ? "no image of channels R, G and B" : "several images; choose one by --layer",
+                         list_layers(file, layers)));
 }
 
 }  // namespace
@@ -115,6 +131,10 @@ GroupedFile::GroupedFile(const std::vector<std::string>& paths, const std::strin
 
 ColourSpace GroupedFile::colours() const { return layer_colours(files_[0]->colours(), groups_[0].channels); }
 
+std::string GroupedFile::groups_text() const {
+  return fmt::format("{} {}", groups(), files_.size() > 1 ? "renders" : "groups");
+}
+
 void GroupedFile::add_file(const std::string& path, const std::string& layer, bool only_file) {
   files_.push_back(std::make_unique<ExrFile>(path));
   const ExrFile& file = *files_.back();
@@ -124,21 +144,20 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
     fail(path, fmt::format("its colours are {}, those of {} {}; renders of one picture have the same colour space",
                            file.colours().text(), source_.files[0], files_[0]->colours().text()));
   else if (!(file.place() == place_))
-    fail(path,
-         fmt::format(
-             "{} x {} pixels at ({}, {}) of a frame of {} x {}; the first group has {} x {} at ({}, {}) of {} x {}",
-             file.place().window.width, file.place().window.height, file.place().window.x, file.place().window.y,
-             file.place().frame_width, file.place().frame_height, place_.window.width, place_.window.height,
-             place_.window.x, place_.window.y, place_.frame_width, place_.frame_height));
+    fail(path, fmt::format("{} x {} pixels at ({}, {}) of a frame of {} x {}; {} has {} x {} at ({}, {}) of {} x {}",
+                           file.place().window.width, file.place().window.height, file.place().window.x,
+                           file.place().window.y, file.place().frame_width, file.place().frame_height, source_.files[0],
+                           place_.window.width, place_.window.height, place_.window.x, place_.window.y,
+                           place_.frame_width, place_.frame_height));
 
   const std::vector<ColourLayer> layers = colour_layers(file.channels());
   const std::vector<ColourLayer> numbered = numbered_layers(layers, layer);
   const size_t first_group = groups_.size();
   if (numbered.size() > 1) {
     if (!only_file)
-      fail(path,
-           fmt::format("holds {} groups; give one file with all groups, or one file with one image for each group",
-                       numbered.size()));
+      fail(path, fmt::format(
+                     "holds {} groups of samples; give it alone, or files of one image each, or --layer for the image",
+                     numbered.size()));
     for (const ColourLayer& group : numbered) {
       groups_.push_back({0, group.channels});
       source_.used.insert(group.channels.begin(), group.channels.end());
@@ -164,8 +183,8 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
 void GroupedFile::take_film_facts(const std::string& path, const ExrFile& file, bool may_be_film) {
   const double samples = samples_per_pixel(file, path);
   if (files_.size() > 1 && samples != samples_of_group_)
-    fail(path, fmt::format("has {} samples per pixel, the group before it {}; all groups must have the same number",
-                           samples, samples_of_group_));
+    fail(path, fmt::format("has {} samples per pixel, {} {}; render all with the same number", samples,
+                           source_.files[files_.size() - 2], samples_of_group_));
   samples_of_group_ = samples;
   samples_ += samples;
   const ExrFile::Channel* counts = file.find(kCounts);
@@ -179,7 +198,7 @@ void GroupedFile::take_film_facts(const std::string& path, const ExrFile& file, 
   const auto agree = [&](const char* key, std::string& value) {
     const std::string here = attribute(file, std::string("covary:") + key);
     if (files_.size() > 1 && here != value)
-      fail(path, fmt::format("{} is '{}', in the first group '{}'", key, here, value));
+      fail(path, fmt::format("{} is '{}', in {} '{}'", key, here, source_.files[0], value));
     value = here;
   };
   agree("sampling", sampling_);
@@ -250,7 +269,7 @@ void GroupedFile::read_rows(int first_row, int n_rows, Rows& rows) const {
     std::vector<ExrPlane> planes;
     for (size_t g = 0; g < groups_.size(); ++g) {
       if (groups_[g].file != f) continue;
-      for (size_t c = 0; c < 3; ++c)
+      for (size_t c = 0; c < (groups_[g].is_grey() ? 1 : 3); ++c)
         planes.push_back(
             {groups_[g].channels[c], ExrPlane::Type::kFloat, rows.data.data() + 3 * g + c, per_pixel * sizeof(float)});
     }
@@ -260,6 +279,9 @@ void GroupedFile::read_rows(int first_row, int n_rows, Rows& rows) const {
     if (has_counts_) planes.push_back({kCounts, ExrPlane::Type::kUint, rows.counts.data(), sizeof(uint32_t)});
     files_[f]->read_rows(planes, first_row, n_rows);
   }
+  for (size_t g = 0; g < groups_.size(); ++g)
+    for (size_t i = 3 * g; groups_[g].is_grey() && i < rows.data.size(); i += per_pixel)
+      rows.data[i + 1] = rows.data[i + 2] = rows.data[i];
 }
 
 GroupedImage GroupedFile::view(const Rows& rows, int n_rows) const {

@@ -19,9 +19,10 @@ namespace covary {
 class GroupedFile {
  public:
   /// One path: all groups, as layers whose names differ in a number (group00.R, group00.G, …), or a single image.
-  /// Several paths: one image each, giving the groups in that order. An image is a colour layer of film/image_file.h;
-  /// if a file has several, `layer` names one (without the group number), or else the picture is used. Throws
-  /// Error(kIo), and Error(kInput) listing the layers found.
+  /// Several paths: one image each, giving the groups in that order. If a file has several images, `layer` names one
+  /// (groups without their number), or else the picture is used (film/pictures.h). Numbered layers of other names than
+  /// "group" are groups only if they are named, or if there are no other colours. Throws Error(kIo), and Error(kInput)
+  /// listing the layers found.
   explicit GroupedFile(const std::vector<std::string>& paths, const std::string& layer = "");
 
   int width() const { return place_.window.width; }
@@ -30,6 +31,7 @@ class GroupedFile {
   /// Of the channels that are read.
   ColourSpace colours() const;
   int groups() const { return static_cast<int>(groups_.size()); }
+  std::string groups_text() const;  ///< "2 renders", or "12 groups" of one file
   /// Samples per pixel of all groups together, averaged over pixels; 0 if the files do not say.
   double samples() const { return samples_; }
   /// Whether the number of samples of each pixel is known, so that read_rows() gives counts.
@@ -74,6 +76,7 @@ class GroupedFile {
   struct Group {
     size_t file;
     std::array<std::string, 3> channels;
+    bool is_grey() const { return channels[0] == channels[2]; }
   };
   void add_file(const std::string& path, const std::string& layer, bool only_file);
   /// Reads metadata of covary's films. The groups of one film follow from its counts; other groups must have equal

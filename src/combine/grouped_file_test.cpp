@@ -91,6 +91,16 @@ TEST_F(GroupedFileTest, ReadsPassesOfOtherRenderers) {
   expect_groups(GroupedFile({write("mitsuba.exr", {"", "nn"}, 0)}, "nn"), {1});
 }
 
+TEST_F(GroupedFileTest, TakesOnlyGroupsForGroups) {
+  expect_groups(GroupedFile({write("only.exr", {"pass1", "pass2"})}), {0, 1});
+  expect_groups(GroupedFile({write("lights.exr", {"", "light1", "light2"})}), {0});
+  expect_groups(GroupedFile({write("lights.exr", {"", "light1", "light2"})}, "light"), {1, 2});
+  expect_groups(GroupedFile({write("lights.exr", {"", "light1", "light2"})}, "light2"), {2});
+  expect_groups(GroupedFile({write("mattes.exr", {"beauty", "uCryptoObject00", "uCryptoObject01"})}), {0});
+  EXPECT_EQ(message({write("two.exr", {"uCryptoObject00", "uCryptoObject01"})}),
+            "two.exr: several images; choose one by --layer; images in it: 'uCryptoObject00', 'uCryptoObject01'");
+}
+
 TEST_F(GroupedFileTest, ReadsAttributesOfFilms) {
   const std::map<std::string, std::string> attributes = {
       {"covary:samples", "24"}, {"covary:sampling", "crn"}, {"covary:scene_hash", "12ab"}};
@@ -123,16 +133,17 @@ TEST_F(GroupedFileTest, ReadsTheCountsOfAFilm) {
 
 TEST_F(GroupedFileTest, SaysWhatIsWrong) {
   const std::string two = write("two.exr", {"ambient", "depth"}), plain = write("plain.exr", {""});
-  EXPECT_EQ(message({two}), "two.exr: several images; name one by its layer; images in it: 'ambient', 'depth'");
+  EXPECT_EQ(message({two}), "two.exr: several images; choose one by --layer; images in it: 'ambient', 'depth'");
   EXPECT_EQ(message({two}, "ambiant"),
             "two.exr: no image 'ambiant'; did you mean 'ambient'?; images in it: 'ambient', 'depth'");
-  EXPECT_EQ(message({plain, write("groups.exr", {"", "g0", "g1"})}),
-            "groups.exr: holds 2 groups; give one file with all groups, or one file with one image for each group");
+  EXPECT_EQ(
+      message({plain, write("groups.exr", {"", "group0", "group1"})}),
+      "groups.exr: holds 2 groups of samples; give it alone, or files of one image each, or --layer for the image");
   EXPECT_EQ(message({plain, write("wide.exr", {""}, 0, {}, 9)}),
-            "wide.exr: 9 x 5 pixels at (0, 0) of a frame of 9 x 5; the first group has 7 x 5 at (0, 0) of 7 x 5");
+            "wide.exr: 9 x 5 pixels at (0, 0) of a frame of 9 x 5; plain.exr has 7 x 5 at (0, 0) of 7 x 5");
   EXPECT_EQ(
       message({write("a.exr", {""}, 0, {{"covary:samples", "8"}}), write("b.exr", {""}, 0, {{"covary:samples", "6"}})}),
-      "b.exr: has 6 samples per pixel, the group before it 8; all groups must have the same number");
+      "b.exr: has 6 samples per pixel, a.exr 8; render all with the same number");
   for (const char* samples : {"many", "12 or so", "-4", "nan", "1e30"})
     EXPECT_EQ(
         message({write("odd.exr", {""}, 0, {{"covary:samples", samples}})}),

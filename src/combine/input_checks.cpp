@@ -93,7 +93,8 @@ class PairStatistics {
 
 /// Counts of values, and grey image means of the groups.
 struct Values {
-  long nonfinite = 0, negative = 0, clipped = 0;
+  long nonfinite = 0, negative = 0, clipped = 0, partly_clipped = 0;  ///< clipped: all values 1; partly: some
+  float brightest = 0;
   int bad_x = -1, bad_y = -1, bad_group = -1;      ///< first non-finite value
   std::vector<double> group_means, group_samples;  ///< sums of values and of samples until finish()
   double mean = 0, variance_of_mean = 0;
@@ -103,7 +104,7 @@ void add_values(const GroupedImage& image, int first_row, Values& v) {
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) {
       const float* p = image.pixel(x, y);
-      bool nonfinite = false, negative = false, clipped = true;
+      bool nonfinite = false, negative = false, clipped = true, partly_clipped = false;
       for (int i = 0; i < 3 * image.groups; ++i) {
         if (!is_usable(p[i])) {
           if (v.bad_x < 0) v.bad_x = x, v.bad_y = first_row + y, v.bad_group = i / 3;
@@ -111,10 +112,13 @@ void add_values(const GroupedImage& image, int first_row, Values& v) {
         }
         negative |= p[i] < 0;
         clipped &= p[i] == 1.0f;
+        partly_clipped |= p[i] == 1.0f;
+        v.brightest = std::max(v.brightest, p[i]);
       }
       v.nonfinite += nonfinite;
       v.negative += negative;
       v.clipped += clipped;
+      v.partly_clipped += partly_clipped && !clipped;
       if (nonfinite) continue;
       for (int t = 0; t < image.groups; ++t) {
         v.group_means[t] += grey(p + 3 * t);
@@ -137,25 +141,32 @@ void finish(Values& v, long pixels) {
   v.variance_of_mean /= std::max(1.0, static_cast<double>(T) * (static_cast<double>(T) - 1));
 }
 
-void check_values(const char* name, long pixels, const Values& v, std::vector<Finding>& findings) {
+/// Noisy values that are limited to 1 leave pixels in which some are 1; a white background does not.
+bool is_clipped(const Values& v, long pixels) {
+  constexpr long kFewest = 500, kFewestPartly = 20;  // one in so many, of the pixels and of those that are 1
+  return v.brightest <= 1 && v.clipped * kFewest > pixels &&
+         (v.partly_clipped * kFewestPartly > v.clipped || v.clipped == pixels);
+}
+
+void check_values(const ImageNames& names, long pixels, const Values& v, std::vector<Finding>& findings) {
+  const std::string& name = names.image;
   if (v.nonfinite)
     findings.push_back(
         {v.nonfinite > kMostLeftOut * static_cast<double>(pixels) ? Severity::kError : Severity::kWarning,
-         fmt::format(
-             "{}: {} of {} pixels hold NaN, infinite or overflowing values, the first at ({}, {}) in render {}; "
-             "these values are left out; find the cause in the renderer",
-             name, v.nonfinite, pixels, v.bad_x, v.bad_y, v.bad_group + 1)});
+         fmt::format("{}: {} of {} pixels hold NaN, infinite or overflowing values, the first at ({}, {}) in {}; "
+                     "these values are left out; find the cause in the renderer",
+                     name, v.nonfinite, pixels, v.bad_x, v.bad_y, names.render(static_cast<size_t>(v.bad_group)))});
   if (v.negative)
     findings.push_back({Severity::kWarning,
                         fmt::format("{}: {} of {} pixels hold negative values; spectral renderers make them of colours "
                                     "that sRGB does not have, which is right, and filters with negative lobes "
                                     "(Mitchell, Lanczos), which must not be used: use a box filter",
                                     name, v.negative, pixels)});
-  if (v.clipped * 500 > pixels)
+  if (is_clipped(v, pixels))
     findings.push_back(
         {Severity::kError,
-         fmt::format("{}: {} of {} pixels are exactly 1 in all groups and channels: values are clipped; save "
-                     "linear, unclipped 32-bit float values (not PNG, no tone mapping)",
+         fmt::format("{}: {} of {} pixels are exactly 1 in all renders and channels, and none is brighter: values are "
+                     "clipped; save linear, unclipped 32-bit float values (not PNG, no tone mapping)",
                      name, v.clipped, pixels)});
 }
 
@@ -281,7 +292,11 @@ void InputChecks::add_rows(const GroupedImage& crn, const GroupedImage& independ
   s.crn_independent.add_rows(crn, independent);
 }
 
-InputReport InputChecks::report() const {
+std::string ImageNames::render(size_t group) const {
+  return group < renders.size() ? renders[group] : fmt::format("render {}", group + 1);
+}
+
+InputReport InputChecks::report(const ImageNames& of_crn, const ImageNames& of_independent) const {
   const State& s = *state_;
   COVARY_CHECK(s.next_row == s.height, "all rows were given");
   const long pixels = static_cast<long>(s.width) * s.height;
@@ -294,8 +309,8 @@ InputReport InputChecks::report() const {
   r.nonfinite_pixels = crn.nonfinite + independent.nonfinite;
   r.negative_pixels = crn.negative + independent.negative;
   r.clipped_pixels = crn.clipped + independent.clipped;
-  if (s.has_crn()) check_values("CRN", pixels, crn, r.findings);
-  check_values("independent image", pixels, independent, r.findings);
+  if (s.has_crn()) check_values(of_crn, pixels, crn, r.findings);
+  check_values(of_independent, pixels, independent, r.findings);
   if (!s.has_crn()) return r;
 
   const auto is_black = [](const Values& v) { return v.mean == 0 && v.negative == 0 && v.nonfinite == 0; };

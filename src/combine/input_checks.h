@@ -26,6 +26,13 @@ struct Correlation {
   long pairs = 0;  ///< 0: not measured (fewer than 3 groups, or no noise)
 };
 
+/// What messages call an image and the renders that it consists of.
+struct ImageNames {
+  std::string image = "independent image";
+  std::vector<std::string> renders;  ///< files, one for each group; empty: groups of one file
+  std::string render(size_t group) const;
+};
+
 struct InputReport {
   Correlation crn_horizontal, crn_vertical;                  ///< neighbours of the CRN image
   Correlation independent_horizontal, independent_vertical;  ///< neighbours of the independent image
@@ -50,7 +57,7 @@ class InputChecks {
   /// The next rows of both images. Throws Error(kUsage) if sizes differ or there are no rows.
   void add_rows(const GroupedImage& crn, const GroupedImage& independent);
   /// Call after the last row.
-  InputReport report() const;
+  InputReport report(const ImageNames& crn = {"CRN", {}}, const ImageNames& independent = {}) const;
 
  private:
   struct State;

@@ -117,7 +117,13 @@ TEST(InputChecks, FindsBadValues) {
   EXPECT_EQ(findings(crn, good_independent()).find("black"), std::string::npos);
   independent = good_independent();
   for (int x = 0; x < 20; ++x) std::fill_n(independent.pixel(x, 3), 36, 1.0f);
-  EXPECT_NE(findings(crn, independent).find("!independent image: 20 of 4800 pixels are exactly 1"), std::string::npos);
+  EXPECT_EQ(findings(crn, independent).find("exactly 1"), std::string::npos) << "others are brighter";
+  for (float& value : independent.data) value = std::min(value, 0.9f);
+  for (int x = 0; x < 20; ++x) std::fill_n(independent.pixel(x, 3), 36, 1.0f);
+  EXPECT_EQ(findings(crn, independent).find("exactly 1"), std::string::npos) << "a white background";
+  std::fill_n(independent.pixel(30, 3), 18, 1.0f);
+  EXPECT_NE(findings(crn, independent).find("!independent image: 20 of 4800 pixels are exactly 1 in all renders"),
+            std::string::npos);
 }
 
 TEST(InputChecks, FindsOtherScenes) {

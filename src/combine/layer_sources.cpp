@@ -28,7 +28,7 @@ void check(const LayerSource& source, const GroupedImage& picture) {
 
 WholeLayers::WholeLayers(const GroupedImage& picture, std::span<const LayerSource> sources) {
   const size_t n = static_cast<size_t>(picture.width) * picture.height * picture.groups * 3;
-  rest_.assign(picture.data, picture.data + n);
+  std::vector<std::pair<std::string, std::vector<float>*>> rests;  // of each sum
   for (const LayerSource& source : sources) {
     if (source.name == kRest ||
         std::any_of(layers_.begin(), layers_.end(), [&](const Layer& other) { return other.name == source.name; }))
@@ -36,19 +36,29 @@ WholeLayers::WholeLayers(const GroupedImage& picture, std::span<const LayerSourc
     check(source, picture);
     Layer& layer = layers_.emplace_back(Layer{source.name, source.groups.all()});
     layer.image.counts = picture.counts, layer.image.mean_count = picture.mean_count;
+    layer.sum = Layer::kNoSum;
+    if (!source.sum) continue;
+    const auto is_it = [&](const auto& rest) { return rest.first == *source.sum; };
+    auto rest = std::find_if(rests.begin(), rests.end(), is_it);
+    if (rest == rests.end())
+      rest = rests.insert(rests.end(), {*source.sum, &rests_.emplace_back(picture.data, picture.data + n)});
+    layer.sum = static_cast<int>(rest - rests.begin());
     for (size_t i = 0; i < n; ++i) {
       if (!std::isfinite(layer.image.data[i]) && std::isfinite(picture.data[i]))
         fail(source.name, "has values that are not finite");
-      rest_[i] -= layer.image.data[i];
+      (*rest->second)[i] -= layer.image.data[i];
     }
   }
-  double left = 0, all = 0;
-  for (size_t i = 0; i < n; ++i)
-    if (std::isfinite(rest_[i])) left += std::abs(rest_[i]), all += std::abs(picture.data[i]);
-  if (left <= kNothing * all) return;
-  GroupedImage rest = picture;
-  rest.data = rest_.data();
-  layers_.push_back({kRest, rest});
+  for (size_t r = 0; r < rests.size(); ++r) {
+    const auto& [sum, values] = rests[r];
+    double left = 0, all = 0;
+    for (size_t i = 0; i < n; ++i)
+      if (std::isfinite((*values)[i])) left += std::abs((*values)[i]), all += std::abs(picture.data[i]);
+    if (left <= kNothing * all) continue;
+    GroupedImage rest = picture;
+    rest.data = values->data();
+    layers_.push_back({sum.empty() ? kRest : kRest + ("_" + sum), rest, static_cast<int>(r)});
+  }
 }
 
 }  // namespace covary

@@ -27,6 +27,7 @@ struct ImageOrigin {
   bool is_one_film = false;          ///< all groups are of one film of covary, and so of different samples
   std::string denoised;              ///< denoised_by() of film/denoised_by.h
   ColourSpace colours = {};
+  std::vector<std::string> renders = {};  ///< files, if each holds one group
 };
 
 /// Appends to `findings` what in the origins argues against combining the images. Throws Error(kInput) if they do not

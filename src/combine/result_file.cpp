@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <deque>
 #include <limits>
 #include <optional>
 #include <set>
@@ -52,48 +53,59 @@ std::vector<float> mean_alpha(const ResultSource& source, const std::string& cha
   return first;
 }
 
-/// The planes of a picture whose channels have these names; grey, as one channel with the mean, in `grey`.
-void add_picture_planes(const std::array<std::string, 3>& names, Image& image, Image& grey,
-                        std::vector<ExrPlane>& planes) {
-  if (names[0] != names[2]) {
-    for (size_t c = 0; c < 3; ++c)
-      planes.push_back({names[c], ExrPlane::Type::kFloat, image.data.data() + c, 3 * sizeof(float)});
-    return;
+/// Changes of a file, and what their planes point to.
+class NewVersion {
+ public:
+  NewVersion(const std::map<std::string, std::string>& attributes, const ResultSource& source)
+      : file_(source.files[0]) {
+    changes_.attributes = attributes;
+    changes_.picture = file_.find(source.picture[0]) ? source.picture[0] : "";
+    changes_.left_out = statistics_channels(file_);
   }
-  grey = Image(image.width, image.height, 1);
-  for (size_t i = 0; i < grey.data.size(); ++i)
-    grey.data[i] = (image.data[3 * i] + image.data[3 * i + 1] + image.data[3 * i + 2]) / 3;
-  add_image_planes(names[0], grey, planes);
-}
 
-/// The image as a new version of the first file.
-std::vector<std::string> write_version(const std::string& path, const std::map<std::string, std::string>& attributes,
-                                       EstimatorResult& result, std::map<std::string, Image>& aovs,
-                                       const ResultSource& source) {
-  const ExrFile file(source.files[0]);
-  ExrChanges changes;
-  changes.attributes = attributes;
-  changes.picture = file.find(source.picture[0]) ? source.picture[0] : "";
-  changes.left_out = statistics_channels(file);
-  changes.left_out.insert(source.used.begin(), source.used.end());
-  Image grey;
-  add_picture_planes(source.picture, result.estimate, grey, changes.planes);
-  if (!result.std_error.data.empty()) add_image_planes("StdError", result.std_error, changes.planes);
-  if (!result.bias.data.empty()) add_image_planes("Bias", result.bias, changes.planes);
-  const std::vector<ColourLayer> layers = colour_layers(file.channels());
-  for (auto& [name, image] : aovs) {
-    const auto old = std::find_if(layers.begin(), layers.end(), [&](const auto& layer) { return layer.name == name; });
-    if (old != layers.end() && image.channels == 3)
-      add_picture_planes(old->channels, image, grey, changes.planes);
-    else
-      add_image_planes(name, image, changes.planes);
+  void add(EstimatorResult& result, std::map<std::string, Image>& aovs, const ResultSource& source) {
+    changes_.left_out.insert(source.used.begin(), source.used.end());
+    add_planes(source.picture, result.estimate);
+    if (!result.std_error.data.empty()) add_image_planes(source.prefix + "StdError", result.std_error, changes_.planes);
+    if (!result.bias.data.empty()) add_image_planes(source.prefix + "Bias", result.bias, changes_.planes);
+    const std::vector<ColourLayer> layers = colour_layers(file_.channels());
+    for (auto& [name, image] : aovs) {
+      const auto old =
+          std::find_if(layers.begin(), layers.end(), [&, &name = name](const auto& l) { return l.name == name; });
+      if (old != layers.end() && image.channels == 3)
+        add_planes(old->channels, image);
+      else
+        add_image_planes((file_.find(name) ? "" : source.prefix) + name, image, changes_.planes);
+    }
+    const std::string alpha = alpha_channel(file_.channels(), source.picture[0]);
+    if (source.files.size() < 2 || alpha.empty() || aovs.contains(alpha)) return;
+    std::vector<float>& mean = alphas_.emplace_back(mean_alpha(source, alpha));
+    if (!mean.empty()) changes_.planes.push_back({alpha, ExrPlane::Type::kFloat, mean.data(), sizeof(float)});
   }
-  const std::string alpha = alpha_channel(file.channels(), source.picture[0]);
-  std::vector<float> mean;
-  if (source.files.size() > 1 && !alpha.empty()) mean = mean_alpha(source, alpha);
-  if (!mean.empty()) changes.planes.push_back({alpha, ExrPlane::Type::kFloat, mean.data(), sizeof(float)});
-  return write_changed_exr(path, source.files[0], changes);
-}
+
+  std::vector<std::string> write(const std::string& path, const std::string& source) const {
+    return write_changed_exr(path, source, changes_);
+  }
+
+ private:
+  /// The planes of an image whose channels have these names; of grey, one channel with the mean.
+  void add_planes(const std::array<std::string, 3>& names, Image& image) {
+    if (names[0] != names[2]) {
+      for (size_t c = 0; c < 3; ++c)
+        changes_.planes.push_back({names[c], ExrPlane::Type::kFloat, image.data.data() + c, 3 * sizeof(float)});
+      return;
+    }
+    Image& grey = greys_.emplace_back(image.width, image.height, 1);
+    for (size_t i = 0; i < grey.data.size(); ++i)
+      grey.data[i] = (image.data[3 * i] + image.data[3 * i + 1] + image.data[3 * i + 2]) / 3;
+    add_image_planes(names[0], grey, changes_.planes);
+  }
+
+  const ExrFile file_;
+  ExrChanges changes_;
+  std::deque<Image> greys_;
+  std::deque<std::vector<float>> alphas_;
+};
 
 }  // namespace
 
@@ -120,7 +132,11 @@ std::vector<std::string> write_result(const std::string& path, const ImagePlace&
   std::map<std::string, std::string> all = attributes;
   const auto predicted = predicted_error(result, std::numeric_limits<double>::infinity(), 0);
   for (const auto& [key, value] : prediction_attributes(predicted)) all["covary:" + key] = value;
-  if (!source.files.empty() && is_exr_image(source.files[0])) return write_version(path, all, result, aovs, source);
+  if (!source.files.empty() && is_exr_image(source.files[0])) {
+    NewVersion version(all, source);
+    version.add(result, aovs, source);
+    return version.write(path, source.files[0]);
+  }
   std::vector<ExrPlane> planes;
   add_image_planes("", result.estimate, planes);
   if (!result.std_error.data.empty()) add_image_planes("StdError", result.std_error, planes);
@@ -128,6 +144,13 @@ std::vector<std::string> write_result(const std::string& path, const ImagePlace&
   for (auto& [name, image] : aovs) add_image_planes(name, image, planes);
   write_exr(path, place, all, planes);
   return {};
+}
+
+std::vector<std::string> write_results(const std::string& path, const std::map<std::string, std::string>& attributes,
+                                       std::vector<ResultPicture>& pictures) {
+  NewVersion version(attributes, pictures[0].source);
+  for (ResultPicture& picture : pictures) version.add(picture.image, picture.aovs, picture.source);
+  return version.write(path, pictures[0].source.files[0]);
 }
 
 }  // namespace covary

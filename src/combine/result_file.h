@@ -27,6 +27,17 @@ std::vector<std::string> write_result(const std::string& path, const ImagePlace&
                                       const std::map<std::string, std::string>& attributes, EstimatorResult& result,
                                       std::map<std::string, Image>& aovs, const ResultSource& source = {});
 
+/// A picture of a result.
+struct ResultPicture {
+  EstimatorResult image;
+  std::map<std::string, Image> aovs;
+  ResultSource source;
+};
+
+/// The same for several pictures of the same files, such as views.
+std::vector<std::string> write_results(const std::string& path, const std::map<std::string, std::string>& attributes,
+                                       std::vector<ResultPicture>& pictures);
+
 /// Channels in a file of covary that describe its samples: groups, their number, errors, history.
 std::set<std::string> statistics_channels(const ExrFile& file);
 

@@ -15,6 +15,7 @@ struct ResultSource {
   std::vector<std::string> files;                        ///< renders of one picture
   std::array<std::string, 3> picture = {"R", "G", "B"};  ///< its channels in the first file, replaced by the image
   std::set<std::string> used;                            ///< channels in the first file that the image is made of
+  std::string prefix;  ///< of the names of new layers ("left."), if the file has several pictures
 };
 
 }  // namespace covary

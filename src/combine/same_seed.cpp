@@ -80,7 +80,7 @@ void SameSeedChecks::add_rows(const GroupedImage& image) {
   }
 }
 
-void SameSeedChecks::report(const char* name, std::vector<Finding>& findings) const {
+void SameSeedChecks::report(const ImageNames& names, std::vector<Finding>& findings) const {
   // Groups of one seed have nearly the same sum: with the groups in order of it, they are neighbours.
   std::vector<size_t> order(groups_.size());
   std::iota(order.begin(), order.end(), 0);
@@ -91,9 +91,9 @@ void SameSeedChecks::report(const char* name, std::vector<Finding>& findings) co
     if (!likeness.is_same(std::max(groups_[a].varied, groups_[b].varied))) continue;
     const char* how = likeness.identical ? "are identical" : "have the same noise";
     findings.push_back({Finding::Severity::kError,
-                        fmt::format("{}: renders {} and {} {}: the same seed was rendered twice, or there is no noise "
-                                    "to remove; give every render its own seed",
-                                    name, a + 1, b + 1, how)});
+                        fmt::format("{}: {} and {} {}: the same seed was rendered twice, or there is no noise to "
+                                    "remove; give every render its own seed",
+                                    names.image, names.render(a), names.render(b), how)});
     return;
   }
 }

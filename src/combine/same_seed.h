@@ -16,9 +16,9 @@ class SameSeedChecks {
   SameSeedChecks(int width, int height, int groups);
   /// The next rows.
   void add_rows(const GroupedImage& image);
-  /// Appends an error if two groups have the same noise; `name`: of the image. Where neighbouring pixels hardly differ
+  /// Appends an error if two groups have the same noise. Where neighbouring pixels hardly differ
   /// (black, constant or noise-free parts), equal groups are no evidence.
-  void report(const char* name, std::vector<Finding>& findings) const;
+  void report(const ImageNames& names, std::vector<Finding>& findings) const;
 
  private:
   int step_, next_row_ = 0;

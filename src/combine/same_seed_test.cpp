@@ -21,7 +21,7 @@ std::string findings(const test::Grouped& image, int rows = kHeight) {
   SameSeedChecks checks(image.width, image.height, image.groups);
   for (int y = 0; y < image.height; y += rows) checks.add_rows(rows_of(image.view(), y, std::min(rows, kHeight - y)));
   std::vector<Finding> found;
-  checks.report("image", found);
+  checks.report({"image", {}}, found);
   return found.empty() ? "" : found[0].text;
 }
 
@@ -53,11 +53,12 @@ TEST(SameSeed, DifferentSeedsPass) {
 }
 
 TEST(SameSeed, OneSeedIsFound) {
-  EXPECT_EQ(findings(repeated(good(12), 9, 0, 0)),
-            "image: renders 1 and 10 are identical: the same seed was rendered twice, or there is no noise to remove; "
-            "give every render its own seed");
+  EXPECT_EQ(
+      findings(repeated(good(12), 9, 0, 0)),
+      "image: render 1 and render 10 are identical: the same seed was rendered twice, or there is no noise to remove; "
+      "give every render its own seed");
   const test::Grouped rounded = repeated(good(2), 1, 1e-5f, 0.01f);  // 4 % of the squares of 2 x 2 pixels differ
-  EXPECT_NE(findings(rounded).find("renders 1 and 2 have the same noise: the same seed"), std::string::npos);
+  EXPECT_NE(findings(rounded).find("render 1 and render 2 have the same noise: the same seed"), std::string::npos);
   EXPECT_EQ(findings(rounded), findings(rounded, 16)) << "in bands";
 }
 
@@ -66,7 +67,7 @@ TEST(SameSeed, FoundBesideABadValueAndABlackHalf) {
   image.pixel(4, 4)[0] = std::numeric_limits<float>::infinity();
   for (int y = 0; y < kHeight / 2; ++y)
     for (int x = 0; x < kWidth; ++x) std::fill_n(image.pixel(x, y), 9, 0.0f);
-  EXPECT_NE(findings(image).find("renders 1 and 3"), std::string::npos);
+  EXPECT_NE(findings(image).find("render 1 and render 3"), std::string::npos);
 }
 
 TEST(SameSeed, EqualPartsWithoutNoiseAreNoEvidence) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "core/error.h"
 #include "core/parallel.h"
@@ -31,14 +32,14 @@ Image mean_of(const GroupedImage& layer, const GroupedImage& picture, const Grou
 
 }  // namespace
 
-void add_up(const Image& image, std::span<Image> layers) {
+void add_up(const Image& image, std::span<Image* const> layers) {
   parallel_for(image.data.size(), 4096, [&](size_t i) {
     double sum = 0, size = 0;
-    for (const Image& layer : layers) sum += layer.data[i], size += std::abs(layer.data[i]);
+    for (const Image* layer : layers) sum += layer->data[i], size += std::abs(layer->data[i]);
     const double missing = image.data[i] - sum, n = static_cast<double>(layers.size());
-    for (Image& layer : layers) {
-      const double part = size > 0 ? std::abs(layer.data[i]) / size : 1 / n;
-      layer.data[i] = static_cast<float>(layer.data[i] + missing * part);
+    for (Image* layer : layers) {
+      const double part = size > 0 ? std::abs(layer->data[i]) / size : 1 / n;
+      layer->data[i] = static_cast<float>(layer->data[i] + missing * part);
     }
   });
 }
@@ -50,7 +51,8 @@ std::vector<Image> denoise_layers(const LayersInput& in) {
   for (const Layer& layer : in.layers) {
     COVARY_CHECK(layer.image.groups == in.independent->groups, "layers have the groups of the picture");
     result.push_back(mean_of(layer.image, *in.independent, nullptr, valid));
-    without_fireflies.push_back(mean_of(layer.image, *in.independent, &limited.view(), valid));
+    const GroupedImage* as_picture = layer.sum == Layer::kNoSum ? nullptr : &limited.view();
+    without_fireflies.push_back(mean_of(layer.image, *in.independent, as_picture, valid));
   }
   const std::vector<Image> means = result;
   size_t p = 0;
@@ -61,7 +63,10 @@ std::vector<Image> denoise_layers(const LayersInput& in) {
         for (size_t i = 0; i < result[k].data.size(); ++i)
           if (valid[i / 3]) result[k].data[i] += weights[i / 3] * (candidate[k].data[i] - means[k].data[i]);
     }
-  add_up(*in.image, result);
+  std::map<int, std::vector<Image*>> sums;
+  for (size_t k = 0; k < result.size(); ++k)
+    if (in.layers[k].sum != Layer::kNoSum) sums[in.layers[k].sum].push_back(&result[k]);
+  for (const auto& [number, layers] : sums) add_up(*in.image, layers);
   return result;
 }
 

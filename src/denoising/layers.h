@@ -10,7 +10,8 @@
 //     L'_k = L_k + (M - sum_j L_j) |L_k| / sum_j |L_j|,
 //
 // which scales positive layers. [Zimmer2015] denoise components of the light apart, too. Claim: sum_k L'_k = M up to
-// rounding, at every pixel.
+// rounding, at every pixel. A picture may be split in several ways; layers that are no part of it, such as alpha, are
+// L_k.
 #pragma once
 
 #include <span>
@@ -35,6 +36,6 @@ struct LayersInput {
 std::vector<Image> denoise_layers(const LayersInput& input);
 
 /// Makes layers add up to `image`, as above. They have its size.
-void add_up(const Image& image, std::span<Image> layers);
+void add_up(const Image& image, std::span<Image* const> layers);
 
 }  // namespace covary

@@ -94,7 +94,9 @@ TEST(Layers, OfAPictureWithoutOthersThanBlackOnesShareIt) {
   picture.data = {1, -2, 0};
   std::vector<Image> layers(2, Image(1, 1, 3));
   layers[0].data[1] = -1, layers[1].data[1] = -3;
-  add_up(picture, layers);
+  std::vector<Image*> all;
+  for (Image& layer : layers) all.push_back(&layer);
+  add_up(picture, all);
   EXPECT_EQ(layers[0].data, (std::vector<float>{0.5f, -0.5f, 0}));
   EXPECT_EQ(layers[1].data, (std::vector<float>{0.5f, -1.5f, 0}));
 }

@@ -44,7 +44,9 @@ struct Guides {
 /// A component of the image, such as direct light.
 struct Layer {
   std::string name;
-  GroupedImage image;  ///< that component of each group of the independent image
+  GroupedImage image;                ///< that component of each group of the independent image
+  int sum = 0;                       ///< layers of the same number add up to the image
+  static constexpr int kNoSum = -1;  ///< not a part of the image, such as alpha
 };
 
 /// Settings of an estimator of a pair, beside the images.
@@ -53,7 +55,7 @@ struct PairSettings {
   bool std_error = false;   ///< also estimate the standard error; used if predicts_error
   bool held_out = true;     ///< together with the standard error, also compute EstimatorResult::held_out
   Guides guides;            ///< used if reads_guides
-  /// Layers that sum to the independent image; used if splits_layers.
+  /// Layers that sum to the independent image, and others; used if splits_layers.
   std::span<const Layer> layers;
 };
 

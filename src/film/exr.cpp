@@ -15,7 +15,11 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
+#include <numeric>
+#include <set>
+#include <sstream>
 
 #include "core/parallel.h"
 #include "film/exr_library.h"
@@ -68,6 +72,32 @@ ColourSpace colour_space_of(const Imf::Header& header, const std::map<std::strin
   }
   const auto* aces = header.findTypedAttribute<Imf::IntAttribute>("acesImageContainerFlag");
   return aces && aces->value() == 1 ? aces_colour_space() : named_colour_space(attributes);
+}
+
+/// The dot-separated parts of the name of a channel's layer.
+std::vector<std::string> layer_words(const std::string& channel) {
+  std::vector<std::string> words;
+  std::stringstream text(channel);
+  for (std::string word; std::getline(text, word, '.');) words.push_back(word);
+  if (!words.empty()) words.pop_back();
+  return words;
+}
+
+/// Views by the attribute multiView (of which those without a layer's name have the first one), or by layers called
+/// left and right; parts may have said theirs before.
+void assign_views(const Imf::Header& header, std::vector<ExrFile::Channel>& channels) {
+  std::vector<std::string> views = {"left", "right"};
+  const bool is_told = Imf::hasMultiView(header) && !Imf::multiView(header).empty();
+  if (is_told) views = Imf::multiView(header);
+  std::set<std::string> found;
+  for (ExrFile::Channel& channel : channels) {
+    for (const std::string& word : layer_words(channel.name))
+      if (channel.view.empty() && std::find(views.begin(), views.end(), word) != views.end()) channel.view = word;
+    if (!channel.view.empty()) found.insert(channel.view);
+  }
+  if (!is_told && found.size() == 1 && *found.begin() == "left") std::swap(views[0], views[1]);
+  for (ExrFile::Channel& channel : channels)
+    if (!found.empty() && channel.view.empty() && channel.name.find('.') == std::string::npos) channel.view = views[0];
 }
 
 const char* type_name(ExrPlane::Type type) { return type == ExrPlane::Type::kUint ? "uint" : "float"; }
@@ -136,13 +166,14 @@ void write_exr(const std::string& path, const ImagePlace& place, const std::map<
 struct ExrFile::Handle {
   explicit Handle(const std::string& path) : file(path.c_str()) {}
   Imf::MultiPartInputFile file;
-  Imath::Box2i window;
+  Imath::Box2i window;                                       // of place_
+  bool has_pixels = false;                                   // in any part so far
   std::map<std::string, std::pair<int, std::string>> parts;  // channel -> part, name in the part
 };
 
 ExrFile::~ExrFile() = default;
 
-ExrFile::ExrFile(const std::string& path, ChecksumPolicy checksums) : path_(path) {
+ExrFile::ExrFile(const std::string& path, ChecksumPolicy checksums, bool unreadable_too) : path_(path) {
   prepare_exr_library();
   // OpenEXR's own messages do not distinguish a missing file from a damaged one.
   if (!is_exr(path)) fail(path, "not an EXR file");
@@ -153,46 +184,67 @@ ExrFile::ExrFile(const std::string& path, ChecksumPolicy checksums) : path_(path
     fail(path, fmt::format("damaged EXR file: {}", error.what()));
   }
 
-  const int n_parts = handle_->file.parts();
-  for (int part = 0; part < n_parts; ++part) {
-    const Imf::Header& header = handle_->file.header(part);
-    if (header.hasType() && Imf::isDeepData(header.type())) {
-      if (n_parts == 1) fail(path, "deep EXR files are not supported");
-      continue;
-    }
-    const ImagePlace place = place_of(path, header);
-    if (channels_.empty()) {
-      place_ = place;
-      handle_->window = header.dataWindow();
-      compression_ = compression_name(header.compression());
-    } else if (!(place == place_)) {
-      fail(path, "parts with different windows are not supported");
-    }
-    const std::string prefix = n_parts > 1 && header.hasName() ? header.name() + "." : "";
-    for (auto it = header.channels().begin(); it != header.channels().end(); ++it) {
-      const Imf::Channel& channel = it.channel();
-      if (channel.xSampling != 1 || channel.ySampling != 1)
-        fail(path,
-             fmt::format("channel {} is sub-sampled, which is not supported{}", it.name(),
-                         std::string(it.name()).ends_with("Y") ? ": luminance and chroma; expected R, G and B" : ""));
-      std::string name = it.name();
-      if (!name.starts_with(prefix)) name.insert(0, prefix);
-      channels_.push_back({name, exr_type_name(channel.type)});
-      handle_->parts[name] = {part, it.name()};
-    }
-    for (auto it = header.begin(); it != header.end(); ++it) {
-      if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&it.attribute()))
-        attributes_.emplace(it.name(), text->value());
-      else if (it.name() == std::string(kChecksums) && checksums == ChecksumPolicy::kCheck)
-        fail(path, fmt::format("damaged: the attribute {} is of the type '{}', not 'string'", kChecksums,
-                               it.attribute().typeName()));
-    }
-  }
-  if (channels_.empty()) fail(path, "an EXR file without channels of pixels with one value each");
+  std::vector<int> parts(static_cast<size_t>(handle_->file.parts()));
+  std::iota(parts.begin(), parts.end(), 0);
+  for (const int part : parts) add_part(part), add_attributes(part, checksums);
+  if (channels_.empty() && !(unreadable_too && !unreadable_.empty()))
+    fail(path, unreadable_.empty() ? "an EXR file without channels"
+                                   : fmt::format("no channels that can be read: {} ({}); render or flatten it with one "
+                                                 "value per pixel and channel",
+                                                 unreadable_[0].name, unreadable_[0].type));
+  assign_views(handle_->file.header(0), channels_);
   colours_ = colour_space_of(handle_->file.header(0), attributes_);
-
   check_pixels();
   if (checksums == ChecksumPolicy::kCheck) check_header();
+}
+
+void ExrFile::add_part(int part) {
+  const Imf::Header& header = handle_->file.header(part);
+  const std::string name = header.hasName() ? header.name() : "", view = header.hasView() ? header.view() : "";
+  const std::string prefix = handle_->file.parts() > 1 && !name.empty() ? name + "." : "";
+  const bool is_deep = header.hasType() && Imf::isDeepData(header.type());
+  const ImagePlace place = place_of(path_, header);
+  bool any = false;
+  for (auto it = header.channels().begin(); it != header.channels().end(); ++it) {
+    const Imf::Channel& channel = it.channel();
+    std::string full = it.name(), type = exr_type_name(channel.type);
+    if (!full.starts_with(prefix)) full.insert(0, prefix);
+    const bool is_subsampled = channel.xSampling != 1 || channel.ySampling != 1;
+    if (is_deep || is_subsampled) {
+      type += is_deep ? ", deep" : fmt::format(", {} x {} sub-sampled", channel.xSampling, channel.ySampling);
+      unreadable_.push_back({full, type, view});
+      continue;
+    }
+    any = true;
+    channels_.push_back({full, type, view});
+    handle_->parts[full] = {part, it.name()};
+  }
+  const std::string compression = compression_name(header.compression());
+  if (compression_.empty())
+    compression_ = compression;
+  else if ((", " + compression_ + ",").find(", " + compression + ",") == std::string::npos)
+    compression_ += ", " + compression;
+  if (place_.frame_width == 0 || (any && !handle_->has_pixels)) {
+    place_ = place;
+    handle_->window = header.dataWindow();
+  } else if (any) {
+    handle_->window.extendBy(header.dataWindow());
+    const Imath::Box2i& all = handle_->window;
+    place_.window = {all.min.x - header.displayWindow().min.x, all.min.y - header.displayWindow().min.y,
+                     all.max.x - all.min.x + 1, all.max.y - all.min.y + 1};
+  }
+  handle_->has_pixels |= any;
+}
+
+void ExrFile::add_attributes(int part, ChecksumPolicy checksums) {
+  const Imf::Header& header = handle_->file.header(part);
+  for (auto it = header.begin(); it != header.end(); ++it) {
+    if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&it.attribute()))
+      attributes_.emplace(it.name(), text->value());
+    else if (it.name() == std::string(kChecksums) && checksums == ChecksumPolicy::kCheck)
+      fail(path_, fmt::format("damaged: the attribute {} is of the type '{}', not 'string'", kChecksums,
+                              it.attribute().typeName()));
+  }
 }
 
 void ExrFile::check_header() {
@@ -243,17 +295,20 @@ std::vector<uint32_t> ExrFile::checksums_of(std::span<const std::string> channel
 }
 
 void ExrFile::check_pixels() const {
-  double file_values = 0, file_value_bytes = 0;
-  for (const Channel& channel : channels_) {
-    file_values += 1;
-    file_value_bytes += channel.type == "half" ? 2 : 4;
+  double file_values = 0, least_bytes = 0, memory = 0;
+  for (const auto& [name, where] : handle_->parts) {
+    const Imf::Header& header = handle_->file.header(where.first);
+    const Imath::Box2i& window = header.dataWindow();
+    const double n_pixels =
+        (static_cast<double>(window.max.x) - window.min.x + 1) * (static_cast<double>(window.max.y) - window.min.y + 1);
+    const double bytes = header.channels().findChannel(where.second)->type == Imf::HALF ? 2 : 4;
+    file_values += 1, memory += n_pixels * sizeof(float);
+    least_bytes += n_pixels * bytes / largest_ratio(compression_name(header.compression()));
   }
-  const double n_pixels = static_cast<double>(place_.window.width) * place_.window.height;
-  const double memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+  const double all_memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
   std::error_code ignored;
   const double file_bytes = static_cast<double>(std::filesystem::file_size(path_, ignored));
-  if (n_pixels * file_values * sizeof(float) > memory ||
-      n_pixels * file_value_bytes > largest_ratio(compression_) * file_bytes)
+  if (memory > all_memory || least_bytes > file_bytes)
     fail(path_, fmt::format("the header says {} x {} pixels of {} channels, more than a file of {:.0f} bytes with "
                             "compression '{}' or the memory can hold",
                             place_.window.width, place_.window.height, file_values, file_bytes, compression_));
@@ -286,14 +341,21 @@ void ExrFile::read_rows(std::span<const ExrPlane> planes, int first_row, int n_r
   Imath::Box2i rows = handle_->window;
   rows.min.y += first_row;
   rows.max.y = rows.min.y + n_rows - 1;
-  std::map<int, Imf::FrameBuffer> buffers;  // by part
+  std::map<int, std::vector<ExrPlane>> by_part;
   for (const ExrPlane& plane : planes) {
     const auto it = handle_->parts.find(plane.name);
     COVARY_CHECK(it != handle_->parts.end(), "channel " + plane.name + " exists");
-    buffers[it->second.first].insert(it->second.second, exr_slice(plane, rows));
+    ExrPlane& in_part = by_part[it->second.first].emplace_back(plane);
+    in_part.name = it->second.second;
   }
   try {
-    for (const auto& [part, buffer] : buffers) {
+    for (const auto& [part, of_part] : by_part) {
+      if (!(handle_->file.header(part).dataWindow() == handle_->window)) {
+        read_from_other_window(part, of_part, first_row, n_rows);
+        continue;
+      }
+      Imf::FrameBuffer buffer;
+      for (const ExrPlane& plane : of_part) buffer.insert(plane.name, exr_slice(plane, rows));
       Imf::InputPart input(handle_->file, part);
       input.setFrameBuffer(buffer);
       input.readPixels(rows.min.y, rows.max.y);
@@ -301,6 +363,37 @@ void ExrFile::read_rows(std::span<const ExrPlane> planes, int first_row, int n_r
   } catch (const std::exception& error) {
     fail(path_, fmt::format("damaged or incomplete EXR file: {}", error.what()));
   }
+}
+
+void ExrFile::read_from_other_window(int part, std::span<const ExrPlane> planes, int first_row, int n_rows) const {
+  const Imath::Box2i &to = handle_->window, from = handle_->file.header(part).dataWindow();
+  const auto width = static_cast<size_t>(place_.window.width), n_bytes = sizeof(float);
+  Imath::Box2i rows({from.min.x, std::max(from.min.y, to.min.y + first_row)},
+                    {from.max.x, std::min(from.max.y, to.min.y + first_row + n_rows - 1)});
+  const int left = std::max(to.min.x, from.min.x), right = std::min(to.max.x, from.max.x);
+  const size_t from_width = static_cast<size_t>(from.max.x - from.min.x + 1);
+  const size_t n = rows.max.y < rows.min.y ? 0 : from_width * static_cast<size_t>(rows.max.y - rows.min.y + 1);
+  std::vector<std::vector<uint32_t>> values(planes.size(), std::vector<uint32_t>(n));
+  Imf::FrameBuffer buffer;
+  for (size_t i = 0; i < planes.size() && n > 0; ++i)
+    buffer.insert(planes[i].name, exr_slice({planes[i].name, planes[i].type, values[i].data(), n_bytes}, rows));
+  if (n > 0) {
+    Imf::InputPart input(handle_->file, part);
+    input.setFrameBuffer(buffer);
+    input.readPixels(rows.min.y, rows.max.y);
+  }
+  for (size_t i = 0; i < planes.size(); ++i)
+    for (int y = 0; y < n_rows; ++y)
+      for (size_t x = 0; x < width; ++x) {
+        const int at_x = to.min.x + static_cast<int>(x), at_y = to.min.y + first_row + y;
+        const bool inside = at_x >= left && at_x <= right && at_y >= rows.min.y && at_y <= rows.max.y;
+        const size_t source =
+            static_cast<size_t>(at_y - rows.min.y) * from_width + static_cast<size_t>(at_x - from.min.x);
+        const uint32_t value = inside ? values[i][source] : 0;
+        char* pixel =
+            static_cast<char*>(planes[i].base) + (static_cast<size_t>(y) * width + x) * planes[i].pixel_stride;
+        std::memcpy(pixel, &value, n_bytes);
+      }
 }
 
 }  // namespace covary

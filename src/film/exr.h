@@ -51,17 +51,22 @@ class ExrFile {
   struct Channel {
     std::string name;  ///< prefixed with the part's name in multi-part files
     std::string type;  ///< "half", "float" or "uint"
+    std::string view;  ///< "left", "right" …; "" for channels of no view, or of all
   };
 
   /// Opens the file and checks its header. Throws Error(kIo) when it cannot be opened; Error(kInput) when it is not an
-  /// EXR file, is damaged, absurdly large or of an unsupported kind (deep or subsampled pixels), or when its header
-  /// does not match its checksum.
-  explicit ExrFile(const std::string& path, ChecksumPolicy checksums = ChecksumPolicy::kCheck);
+  /// EXR file, is damaged, absurdly large or has no channels that can be read, or when its header does not match its
+  /// checksum. `unreadable_too`: do not throw if it has only deep or sub-sampled channels.
+  explicit ExrFile(const std::string& path, ChecksumPolicy checksums = ChecksumPolicy::kCheck,
+                   bool unreadable_too = false);
   ~ExrFile();
 
-  /// The window may extend beyond the frame.
+  /// The window may extend beyond the frame. It holds the windows of all parts; where a part has no pixels, its
+  /// channels are 0.
   const ImagePlace& place() const { return place_; }
   const std::vector<Channel>& channels() const { return channels_; }
+  /// Channels that cannot be read; their types say why ("half, deep", "half, 2 x 2 sub-sampled").
+  const std::vector<Channel>& unreadable() const { return unreadable_; }
   const Channel* find(const std::string& name) const;
   const std::map<std::string, std::string>& attributes() const { return attributes_; }  ///< string attributes only
   const std::string& compression() const { return compression_; }
@@ -83,8 +88,14 @@ class ExrFile {
 
  private:
   struct Handle;
+  /// Lists the channels of a part.
+  void add_part(int part);
+  /// Takes over text attributes; throws if the checksums are no text.
+  void add_attributes(int part, ChecksumPolicy checksums);
   /// Throws if the header declares more pixels than fit in memory or than the file can hold.
   void check_pixels() const;
+  /// Reads these rows of the file's window from a part with a smaller one.
+  void read_from_other_window(int part, std::span<const ExrPlane> planes, int first_row, int n_rows) const;
   /// Reads the file's checksums, if any; throws if the header does not match.
   void check_header();
   /// Throws if the channel's checksum differs from the stored one.
@@ -93,7 +104,7 @@ class ExrFile {
   std::string path_;
   std::unique_ptr<Handle> handle_;
   ImagePlace place_;
-  std::vector<Channel> channels_;
+  std::vector<Channel> channels_, unreadable_;
   std::map<std::string, std::string> attributes_;
   std::string compression_;
   ColourSpace colours_;

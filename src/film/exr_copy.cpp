@@ -39,6 +39,7 @@ struct Part {
   Imf::Header header;
   bool is_same = true;                     ///< all channels of the source
   std::vector<std::string> kept;           ///< in the source, by the names there
+  std::vector<std::string> subsampled;     ///< in the source; kept only if all channels are
   std::vector<ExrFile::Channel> channels;  ///< of the new part, sorted by name, as ExrFile will list them
   std::vector<std::pair<std::string, const ExrPlane*>> planes;  ///< by the names in the part
 
@@ -70,7 +71,7 @@ class Copy {
   }
 
   void write(const std::string& path) {
-    parts_[picture_part()].header.insert(kChecksums, Imf::StringAttribute(checksums().text()));
+    if (has_one_window()) parts_[picture_part()].header.insert(kChecksums, Imf::StringAttribute(checksums().text()));
     OutputFile output(path);
     try {
       ExrStream stream(output, path);
@@ -110,6 +111,10 @@ class Copy {
     const Imf::ChannelList& channels = in_.header(n).channels();
     for (auto it = channels.begin(); it != channels.end(); ++it) {
       const std::string name = full_name(prefix, it.name());
+      if (it.channel().xSampling != 1 || it.channel().ySampling != 1) {
+        part.subsampled.emplace_back(it.name());
+        continue;
+      }
       if (const ExrPlane* replacing = plane(name)) {
         part.planes.emplace_back(it.name(), replacing), has_planes = true;
       } else if (!changes_.only_planes && !changes_.left_out.contains(name)) {
@@ -118,7 +123,8 @@ class Copy {
       }
       part.is_same = false;
     }
-    if (part.kept.empty() && !has_planes && n != part_of_picture()) return std::nullopt;
+    if (changes_.only_planes) part.subsampled.clear();
+    if (part.kept.empty() && part.subsampled.empty() && !has_planes && n != part_of_picture()) return std::nullopt;
     return part;
   }
 
@@ -140,21 +146,30 @@ class Copy {
     return static_cast<size_t>(std::find_if(parts_.begin(), parts_.end(), is_it) - parts_.begin());
   }
 
-  /// Puts planes without a channel of their name into the picture's part.
+  /// Of the part's channels, in the new file.
+  std::string new_prefix(const Part& part) const {
+    return parts_.size() > 1 && !part.is_deep() ? prefix_of(in_, part.source) : "";
+  }
+
+  /// Puts planes without a channel of their name into the part of which they have the prefix, or into the picture's.
   void place_planes() {
     Part& picture = parts_[picture_part()];
-    const std::string prefix = parts_.size() > 1 ? prefix_of(in_, picture.source) : "";
     for (const ExrPlane& plane : changes_.planes) {
       const bool placed = std::any_of(parts_.begin(), parts_.end(), [&](const Part& part) {
         return std::any_of(part.planes.begin(), part.planes.end(), [&](const auto& p) { return p.second == &plane; });
       });
       if (placed) continue;
-      const bool has_prefix = !prefix.empty() && plane.name.starts_with(prefix);
-      picture.planes.emplace_back(has_prefix ? plane.name.substr(prefix.size()) : plane.name, &plane);
-      picture.is_same = false;
+      const auto is_of = [&](const Part& part) {
+        const std::string own = new_prefix(part);
+        return !own.empty() && plane.name.starts_with(own);
+      };
+      const auto named = std::find_if(parts_.begin(), parts_.end(), is_of);
+      Part& part = named == parts_.end() ? picture : *named;
+      part.planes.emplace_back(named == parts_.end() ? plane.name : plane.name.substr(new_prefix(part).size()), &plane);
+      part.is_same = false;
     }
     for (Part& part : parts_) {
-      const std::string own = parts_.size() > 1 ? prefix_of(in_, part.source) : "";
+      const std::string own = new_prefix(part);
       part.channels.clear();
       const Imf::ChannelList& channels = in_.header(part.source).channels();
       for (const std::string& name : part.kept)
@@ -164,10 +179,26 @@ class Copy {
     }
   }
 
+  /// Whether all parts have the window of the planes, which checksums are of.
+  bool has_one_window() const {
+    return std::all_of(parts_.begin(), parts_.end(), [&](const Part& part) {
+      return part.is_deep() || part.header.dataWindow() == window_of_planes(part);
+    });
+  }
+
+  /// The window of the planes, in the part's coordinates.
+  Imath::Box2i window_of_planes(const Part& part) const {
+    const CropWindow& w = file_.place().window;
+    const Imath::V2i corner = part.header.displayWindow().min + Imath::V2i(w.x, w.y);
+    return {corner, corner + Imath::V2i(w.width - 1, w.height - 1)};
+  }
+
   void make_scan_lines(Part& part) {
     if (part.is_tiled() && part.header.tileDescription().mode != Imf::ONE_LEVEL)
       lost_.push_back(
           fmt::format("{}: smaller levels (mip maps) are not kept, since they show the old image", source_));
+    for (const std::string& name : part.subsampled)
+      lost_.push_back(fmt::format("{}: the channel {} is not kept, since it is sub-sampled", source_, name));
     part.header.erase("tiles");
     if (part.header.hasType()) part.header.setType(Imf::SCANLINEIMAGE);
     part.header.lineOrder() = Imf::INCREASING_Y;
@@ -244,7 +275,7 @@ class Copy {
         read.insert(part.kept[i], Imf::Slice::Make(type, base, rows, size, size * width));
       }
       written = read;
-      for (const auto& [name, plane] : part.planes) written.insert(name, exr_slice(*plane, window));
+      for (const auto& [name, plane] : part.planes) written.insert(name, exr_slice(*plane, window_of_planes(part)));
       if (!part.kept.empty()) {
         from.setFrameBuffer(read);
         from.readPixels(rows.min.y, rows.max.y);

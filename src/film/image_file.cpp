@@ -13,8 +13,8 @@
 #include <utility>
 
 #include "core/memory_limit.h"
+#include "film/pictures.h"
 #include "imageio/exr_image.h"
-#include "imageio/exr_picture.h"
 #include "imageio/image_io.h"
 
 namespace covary {
@@ -118,8 +118,8 @@ std::vector<std::string> layer_channels(const std::string& path, const std::vect
   if (!names.empty()) return names;
   const std::vector<Layer> layers = find_layers(channels);
   if (layer.empty() && layers.size() == 1) return layers[0].channels;
-  const std::vector<ColourLayer> colours = layer.empty() ? colour_layers(channels) : std::vector<ColourLayer>();
-  if (const ColourLayer* picture = find_picture(colours)) return {picture->channels.begin(), picture->channels.end()};
+  const std::vector<Picture> pictures = layer.empty() ? find_pictures(channels) : std::vector<Picture>();
+  if (pictures.size() == 1) return {pictures[0].channels.begin(), pictures[0].channels.end()};
   for (const ExrFile::Channel& c : channels)
     if (!layer.empty() && c.name == layer) return {c.name, c.name, c.name};
   std::string known, all;
@@ -129,6 +129,9 @@ std::vector<std::string> layer_channels(const std::string& path, const std::vect
   for (size_t i = 0; i < std::min(channels.size(), kMostNamed); ++i) all += (i ? " " : "") + channels[i].name;
   if (channels.size() > kMostNamed) all += " …";
   const std::string have = fmt::format("layers: {}; channels: {}", known.empty() ? "none" : known, all);
+  if (layer.empty() && pictures.size() > 1)
+    fail(path, fmt::format("several pictures, {}; choose one by {}--layer", text_of(pictures),
+                           pictures[0].view.empty() ? "" : "--view or "));
   if (layer.empty()) fail(path, "no channels R G B; choose a layer (" + have + ")");
   std::vector<std::string> candidates;
   for (const Layer& known_layer : layers)
@@ -145,12 +148,21 @@ ImageInfo info_of(const ImageHeader& header) {
   return info;
 }
 
+namespace {
+
+ImageInfo info_of(const ExrFile& file) {
+  return {"openexr",         file.compression(), file.place(),     file.channels(),
+          file.attributes(), file.colours(),     file.unreadable()};
+}
+
+}  // namespace
+
 ImageInfo inspect_image(const std::string& path, ChecksumPolicy checksums) {
-  if (is_exr_image(path)) {
-    const ExrFile file(path, checksums);
-    return {"openexr", file.compression(), file.place(), file.channels(), file.attributes(), file.colours()};
-  }
-  return info_of(open_image(path)->header());
+  return is_exr_image(path) ? info_of(ExrFile(path, checksums)) : info_of(open_image(path)->header());
+}
+
+ImageInfo describe_image(const std::string& path) {
+  return is_exr_image(path) ? info_of(ExrFile(path, ChecksumPolicy::kIgnore, true)) : inspect_image(path);
 }
 
 void check_image(const std::string& path) {
@@ -230,19 +242,6 @@ std::vector<ColourLayer> colour_layers(const std::vector<ExrFile::Channel>& chan
     if (auto xyz = channels_that_end(by_layer.channels.at(""), "", {"x", "y", "z"}); !xyz.empty())
       layers.push_back({"", {xyz[0], xyz[1], xyz[2]}});
   return layers;
-}
-
-const ColourLayer* find_picture(std::span<const ColourLayer> layers) {
-  for (const ColourLayer& layer : layers)
-    if (layer.name.empty()) return &layer;
-  if (layers.size() == 1) return &layers[0];
-  const ColourLayer* picture = nullptr;
-  for (const ColourLayer& layer : layers) {
-    if (!names_picture(layer.name)) continue;
-    if (picture) return nullptr;
-    picture = &layer;
-  }
-  return picture;
 }
 
 std::string_view last_part(std::string_view name) {

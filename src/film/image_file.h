@@ -22,6 +22,7 @@ struct ImageInfo {
   std::vector<ExrFile::Channel> channels;
   std::map<std::string, std::string> attributes;
   ColourSpace colours = {};
+  std::vector<ExrFile::Channel> unreadable = {};  ///< of EXR: deep and sub-sampled ones
 };
 
 struct PlacedImage {
@@ -32,6 +33,9 @@ struct PlacedImage {
 
 /// Throws Error(kIo) when the file cannot be opened, Error(kInput) when it is damaged or of an unknown format.
 ImageInfo inspect_image(const std::string& path, ChecksumPolicy checksums = ChecksumPolicy::kCheck);
+
+/// The same without any check of checksums, also of files that have only channels that cannot be read.
+ImageInfo describe_image(const std::string& path);
 
 struct ImageHeader;
 /// Same, for a file already opened by OpenImageIO.
@@ -50,8 +54,9 @@ void require_image_memory(const std::string& path, int width, int height, double
 
 /// Reads three channels as linear RGB (integer files are decoded from sRGB). `layer` selects the channels: "N" for N.X
 /// N.Y N.Z, "group03" for group03.R/G/B, or the full name of a single channel, returned as grey; "" is the picture
-/// (find_picture), or X Y Z, or Y, or the only layer there is. Colours (holds_colours) are converted to `colours`;
-/// none: as stored. Throws like inspect_image; for an unknown layer, throws Error(kInput) listing the existing ones.
+/// without a layer's name, or the only one (film/pictures.h), or the only layer there is. Colours (holds_colours) are
+/// converted to `colours`; none: as stored. Throws like inspect_image; for an unknown layer, throws Error(kInput)
+/// listing the existing ones.
 PlacedImage read_image(const std::string& path, const std::string& layer = "",
                        ChecksumPolicy checksums = ChecksumPolicy::kCheck,
                        const std::optional<ColourSpace>& colours = ColourSpace::rec709());
@@ -90,11 +95,6 @@ struct ColourLayer {
 /// RGB layers in the file's order: R G B, as covary, Mitsuba, pbrt and Blender name them, r g b (RenderMan), red green
 /// blue (V-Ray).
 std::vector<ColourLayer> colour_layers(const std::vector<ExrFile::Channel>& channels);
-
-/// The layer that is the picture if no layer is named: the one without a name, the only one, or the only one with a
-/// name that some renderer gives its picture: Combined (Blender), Ci (RenderMan), C, RGBA, rgb, beauty. Null if there
-/// is none.
-const ColourLayer* find_picture(std::span<const ColourLayer> layers);
 
 /// The last part of a layer's name: "Combined" of "ViewLayer.Combined".
 std::string_view last_part(std::string_view name);

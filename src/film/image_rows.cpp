@@ -37,6 +37,7 @@ ImageRows::ImageRows(const std::string& path, const std::string& layer, Checksum
     place_ = exr_->place();
     names_ = layer_channels(path, exr_->channels(), layer);
     colours_ = layer_colours(exr_->colours(), names_);
+    alpha_ = alpha_channel(exr_->channels(), names_[0]);
     return;
   }
   file_ = open_image(path);
@@ -111,26 +112,31 @@ PlacedImage read_image(const std::string& path, const std::string& layer, Checks
   return result;
 }
 
-Alpha read_alpha(const std::string& path, const std::string& layer, ChecksumPolicy checksums) {
-  Alpha alpha;
-  if (is_exr_image(path)) {
-    const ExrFile file(path, checksums);
-    const std::string name = alpha_channel(file.channels(), layer_channels(path, file.channels(), layer)[0]);
-    if (name.empty()) return alpha;
-    const CropWindow& window = file.place().window;
-    require_image_memory(path, window.width, window.height, sizeof(float));
-    alpha.values = Image(window.width, window.height, 1);
-    const ExrPlane plane{name, ExrPlane::Type::kFloat, alpha.values.data.data(), sizeof(float)};
-    file.read({&plane, 1});
+bool ImageRows::has_alpha() const {
+  return exr_ ? !alpha_.empty() : layer_.empty() && file_->header().alpha_channel >= 0;
+}
+
+bool ImageRows::has_straight_alpha() const { return file_ && has_alpha() && file_->header().straight_alpha; }
+
+Image ImageRows::read_alpha(int first_row, int n_rows) {
+  const int width = place_.window.width;
+  require_image_memory(path_, width, n_rows, sizeof(float));
+  Image alpha(width, n_rows, 1);
+  if (exr_) {
+    const ExrPlane plane{alpha_, ExrPlane::Type::kFloat, alpha.data.data(), sizeof(float)};
+    n_rows == place_.window.height ? exr_->read({&plane, 1}) : exr_->read_rows({&plane, 1}, first_row, n_rows);
     return alpha;
   }
-  const std::unique_ptr<ImageReader> file = open_image(path);
-  const ImageHeader& header = file->header();
-  if (header.alpha_channel < 0 || !layer.empty()) return alpha;
-  alpha.straight = header.straight_alpha;
-  alpha.values = Image(header.width, header.height, 1);
-  alpha.values.data = file->read_floats(header.alpha_channel, header.alpha_channel + 1);
+  if (!alpha_file_) alpha_file_ = open_image(path_);
+  const int channel = file_->header().alpha_channel;
+  alpha.data = alpha_file_->read_floats(channel, channel + 1, first_row, n_rows);
   return alpha;
+}
+
+Alpha read_alpha(const std::string& path, const std::string& layer, ChecksumPolicy checksums) {
+  ImageRows file(path, layer, checksums);
+  if (!file.has_alpha()) return {};
+  return {file.read_alpha(0, file.place().window.height), file.has_straight_alpha()};
 }
 
 }  // namespace covary

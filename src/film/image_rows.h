@@ -33,6 +33,12 @@ class ImageRows {
   Image read(int first_row, int n_rows);
   Image read_all() { return read(0, place_.window.height); }
 
+  /// Whether the layer has alpha; whether its colours are not multiplied by it, as in PNG.
+  bool has_alpha() const;
+  bool has_straight_alpha() const;
+  /// Its values, 1 channel, likewise.
+  Image read_alpha(int first_row, int n_rows);
+
  private:
   Image read_stored(int first_row, int n_rows);
   Image read_exr(int first_row, int n_rows);
@@ -42,11 +48,13 @@ class ImageRows {
   ColourSpace colours_;
   std::optional<RgbMatrix> conversion_;
   bool low_dynamic_range_ = false;
-  std::vector<std::string> names_;     // of the three channels
-  std::unique_ptr<ExrFile> exr_;       // exactly one of
-  std::unique_ptr<ImageReader> file_;  // these two is set
-  bool checked_ = false;               // whether checksums were verified
-  Image whole_;                        // of a format without row access
+  std::vector<std::string> names_;           // of the three channels
+  std::unique_ptr<ExrFile> exr_;             // exactly one of
+  std::unique_ptr<ImageReader> file_;        // these two is set
+  std::unique_ptr<ImageReader> alpha_file_;  // its own, since formats go back only to the top
+  std::string alpha_;                        // channel of EXR
+  bool checked_ = false;                     // whether checksums were verified
+  Image whole_;                              // of a format without row access
 };
 
 }  // namespace covary

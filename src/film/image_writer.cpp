@@ -7,6 +7,7 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 
 #include "core/error.h"
 #include "core/srgb.h"
@@ -152,6 +153,26 @@ void write_png(const std::string& path, const Image& linear, const Image& alpha)
   const std::vector<unsigned char> content =
       encode_png(linear.width, linear.height, display_bytes(linear, alpha), {{kSoftwareKey, kSoftware}});
   write_content(path, content);
+}
+
+void write_png_rows(const std::string& path, int width, int height,
+                    const std::function<std::pair<Image, Image>(int first, int n)>& rows) {
+  constexpr int kRows = 64;
+  OutputFile file(path);
+  std::unique_ptr<PngRowWriter> writer;
+  for (int first = 0; first < height; first += kRows) {
+    const int n = std::min(kRows, height - first);
+    const auto [colours, alpha] = rows(first, n);
+    const std::vector<uint8_t> bytes = display_bytes(colours, alpha);
+    const size_t of_row = bytes.size() / static_cast<size_t>(n);
+    if (!writer)
+      writer = std::make_unique<PngRowWriter>(width, height, !alpha.data.empty(),
+                                              std::map<std::string, std::string>{{kSoftwareKey, kSoftware}},
+                                              [&](const void* data, size_t size) { file.write(data, size); });
+    for (int y = 0; y < n; ++y) writer->write_row(&bytes[of_row * static_cast<size_t>(y)]);
+  }
+  writer->finish();
+  file.commit();
 }
 
 bool is_own_png(const std::string& path) {

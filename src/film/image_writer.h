@@ -2,8 +2,10 @@
 // Writes pictures in the format given by the file name: EXR by OpenEXR, all others by src/imageio.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "film/exr.h"
@@ -34,6 +36,11 @@ Image framed(const Image& image, const ImagePlace& place);
 /// Writes linear RGB, multiplied by `alpha` if there is one, as 8-bit sRGB, values clamped to [0, 1], NaN as black. The
 /// text chunk `Software` identifies covary. Throws Error(kIo).
 void write_png(const std::string& path, const Image& linear, const Image& alpha = {});
+
+/// The same, row by row in little memory: `rows` gives n rows from the first one on, and their alpha (empty: none, for
+/// all rows).
+void write_png_rows(const std::string& path, int width, int height,
+                    const std::function<std::pair<Image, Image>(int first, int n)>& rows);
 
 /// Whether the file is a PNG written by write_png().
 bool is_own_png(const std::string& path);

@@ -133,6 +133,14 @@ constexpr unsigned char kMagic[4] = {0x76, 0x2f, 0x31, 0x01};
 constexpr uint32_t kMultiPart = 0x1000;  // flag in the version field
 constexpr size_t kLongestName = 255;
 
+constexpr int kLastCompression = Imf::NUM_COMPRESSION_METHODS - 1;
+
+/// Of later versions of OpenEXR (ImfCompression.h of 3.4).
+std::string new_compression(int number) {
+  return number == 10 ? "HTJ2K256 (of OpenEXR 3.4)"
+                      : (number == 11 ? "HTJ2K32 (of OpenEXR 3.4)" : fmt::format("number {}", number));
+}
+
 class HeaderCheck {
  public:
   explicit HeaderCheck(const std::string& path) : path_(path), file_(nullptr, &std::fclose) {
@@ -181,7 +189,7 @@ class HeaderCheck {
       const uint32_t size = whole_number();
       if (size > left_)
         fail(fmt::format("the attribute '{}' claims {} bytes; {} bytes of the file are left", name, size, left_));
-      if (type == "stringvector" || type == "preview") {
+      if (type == "stringvector" || type == "preview" || type == "compression") {
         std::vector<char> value(size);
         if (std::fread(value.data(), 1, size, file_.get()) != size) fail("the file ends in its header");
         check_value(name, type, value);
@@ -201,6 +209,15 @@ class HeaderCheck {
       std::memcpy(&number, value.data() + at, sizeof(number));
       return number;
     };
+    if (type == "compression") {
+      const int number = value.empty() ? -1 : static_cast<unsigned char>(value[0]);
+      if (number > kLastCompression)
+        throw Error(ErrorCode::kInput,
+                    fmt::format("{}: compression {}, which is newer than this program's OpenEXR; save "
+                                "the file with another one, e.g. ZIP or PIZ",
+                                path_, new_compression(number)));
+      return;
+    }
     if (type == "preview") {
       const uint64_t width = number_at(0), height = number_at(4);
       if (width > value.size() || height > value.size() || 8 + 4 * width * height != value.size())
@@ -253,5 +270,15 @@ bool is_exr(const std::string& path) {
 }
 
 void check_exr_header(const std::string& path) { HeaderCheck(path).check(); }
+
+bool is_complete_exr(const std::string& path) try {
+  check_exr_header(path);
+  const Imf::MultiPartInputFile file(path.c_str(), 0);
+  for (int part = 0; part < file.parts(); ++part)
+    if (!file.partComplete(part)) return false;
+  return true;
+} catch (const std::exception&) {
+  return false;
+}
 
 }  // namespace covary

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <ranges>
 #include <string_view>
 
 #include "core/error.h"
@@ -13,7 +14,7 @@
 namespace covary {
 namespace {
 
-constexpr std::array kPictures = {"combined", "ci", "c", "rgba", "rgb", "beauty"};
+constexpr std::array kPictures = {"combined", "ci", "c", "rgba", "rgb", "beauty", "default", "noisy image"};
 constexpr std::array kColours = {std::array{"r", "g", "b"}, std::array{"red", "green", "blue"}};
 constexpr size_t kMostListed = 20;  // channels of a part in a message
 
@@ -90,17 +91,22 @@ std::string listed(std::span<const ExrPart> parts) {
 /// The only candidate, or the only one that is named as a picture. Throws if there are several.
 ExrPicture choose(const std::vector<Candidate>& candidates, std::span<const ExrPart> parts, const std::string& path) {
   if (candidates.size() == 1) return candidates[0].picture;
-  const auto is_named = [](const Candidate& c) { return names_picture(c.name); };
-  if (std::ranges::count_if(candidates, is_named) == 1) return std::ranges::find_if(candidates, is_named)->picture;
+  const auto rank = [](const Candidate& c) { return rank_as_picture(c.name); };
+  const int best = std::ranges::min(candidates | std::views::transform(rank));
+  if (best != kNoPicture && std::ranges::count(candidates, best, rank) == 1)
+    return std::ranges::find(candidates, best, rank)->picture;
   throw Error(ErrorCode::kInput, fmt::format("{} has {}: {} pictures; a texture needs one, or one named {}", path,
                                              listed(parts), candidates.size(), "'beauty' or 'rgba'"));
 }
 
 }  // namespace
 
-bool names_picture(std::string_view name) {
-  return std::ranges::any_of(kPictures, [&](const char* picture) { return same(last_part(name), picture); });
+int rank_as_picture(std::string_view name) {
+  const auto it = std::ranges::find_if(kPictures, [&](const char* picture) { return same(last_part(name), picture); });
+  return it == kPictures.end() ? kNoPicture : static_cast<int>(it - kPictures.begin());
 }
+
+bool names_picture(std::string_view name) { return rank_as_picture(name) != kNoPicture; }
 
 ExrPicture find_exr_picture(std::span<const ExrPart> parts, const std::string& path) {
   const std::vector<Candidate> colours = find_colours(parts);

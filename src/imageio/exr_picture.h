@@ -10,8 +10,11 @@
 namespace covary {
 
 /// Whether the name of a layer or part, after its last dot, is one that renderers give their picture
-/// (docs/other-renderers.md): "Combined", "Ci", "C", "RGBA", "beauty", in upper or lower case.
+/// (docs/other-renderers.md): "Combined", "Ci", "C", "RGBA", "beauty", "default", in upper or lower case.
 bool names_picture(std::string_view name);
+/// Of several such names, the picture is the one with the lowest number; kNoPicture for other names.
+int rank_as_picture(std::string_view name);
+inline constexpr int kNoPicture = 1000;
 
 struct ExrPart {
   struct Channel {

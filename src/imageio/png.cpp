@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <memory>
 #include <new>
+#include <utility>
 
 #include "core/error.h"
 #include "imageio/plain_rows.h"
@@ -20,9 +21,8 @@ namespace {
 }
 void ignore_warning(png_structp, png_const_charp) {}
 
-void append(png_structp png, png_bytep data, size_t size) {
-  auto& content = *static_cast<std::vector<unsigned char>*>(png_get_io_ptr(png));
-  content.insert(content.end(), data, data + size);
+void send(png_structp png, png_bytep data, size_t size) {
+  (*static_cast<PngRowWriter::Sink*>(png_get_io_ptr(png)))(data, size);
 }
 void no_flush(png_structp) {}
 
@@ -79,14 +79,18 @@ std::unique_ptr<ImageReader> open_plain_png(const std::string& path) {
   return open_plain_rows(path, "png", [](std::FILE* file) { return std::make_unique<PngRows>(file); });
 }
 
-std::vector<unsigned char> encode_png(int width, int height, const std::vector<uint8_t>& pixels,
-                                      const std::map<std::string, std::string>& texts) {
-  const size_t n_pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
-  const bool has_alpha = pixels.size() == 4 * n_pixels;
-  COVARY_CHECK(width > 0 && height > 0 && (has_alpha || pixels.size() == 3 * n_pixels), "three or four bytes a pixel");
-  std::vector<unsigned char> content;
-  const Writer writer;
-  png_set_write_fn(writer.png, &content, append, no_flush);
+struct PngRowWriter::State {
+  Sink sink;
+  Writer writer;
+};
+
+PngRowWriter::PngRowWriter(int width, int height, bool has_alpha, const std::map<std::string, std::string>& texts,
+                           Sink sink)
+    : state_(std::make_unique<State>()) {
+  COVARY_CHECK(width > 0 && height > 0, "a PNG has pixels");
+  state_->sink = std::move(sink);
+  const Writer& writer = state_->writer;
+  png_set_write_fn(writer.png, &state_->sink, send, no_flush);
   png_set_IHDR(writer.png, writer.info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), 8,
                has_alpha ? PNG_COLOR_TYPE_RGB_ALPHA : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
                PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
@@ -99,8 +103,26 @@ std::vector<unsigned char> encode_png(int width, int height, const std::vector<u
     png_set_text(writer.png, writer.info, &chunk, 1);  // copies
   }
   png_write_info(writer.png, writer.info);
-  for (int y = 0; y < height; ++y) png_write_row(writer.png, pixels.data() + (has_alpha ? size_t{4} : 3) * width * y);
-  png_write_end(writer.png, nullptr);
+}
+
+PngRowWriter::~PngRowWriter() = default;
+
+void PngRowWriter::write_row(const uint8_t* pixels) { png_write_row(state_->writer.png, pixels); }
+
+void PngRowWriter::finish() { png_write_end(state_->writer.png, nullptr); }
+
+std::vector<unsigned char> encode_png(int width, int height, const std::vector<uint8_t>& pixels,
+                                      const std::map<std::string, std::string>& texts) {
+  const size_t n_pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
+  const bool has_alpha = pixels.size() == 4 * n_pixels;
+  COVARY_CHECK(has_alpha || pixels.size() == 3 * n_pixels, "three or four bytes a pixel");
+  std::vector<unsigned char> content;
+  PngRowWriter writer(width, height, has_alpha, texts, [&](const void* data, size_t size) {
+    const auto* bytes = static_cast<const unsigned char*>(data);
+    content.insert(content.end(), bytes, bytes + size);
+  });
+  for (int y = 0; y < height; ++y) writer.write_row(pixels.data() + (has_alpha ? size_t{4} : 3) * width * y);
+  writer.finish();
   return content;
 }
 

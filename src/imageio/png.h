@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -21,6 +22,24 @@ std::unique_ptr<ImageReader> open_plain_png(const std::string& path);
 /// characters, UTF-8 values. Throws Error(kIo) if libpng refuses the size or a keyword.
 std::vector<unsigned char> encode_png(int width, int height, const std::vector<uint8_t>& pixels,
                                       const std::map<std::string, std::string>& texts = {});
+
+/// The same row by row, in little memory.
+class PngRowWriter {
+ public:
+  using Sink = std::function<void(const void* data, size_t size)>;
+  /// `sink` gets the file's bytes in their order.
+  PngRowWriter(int width, int height, bool has_alpha, const std::map<std::string, std::string>& texts, Sink sink);
+  ~PngRowWriter();
+  PngRowWriter(const PngRowWriter&) = delete;
+  PngRowWriter& operator=(const PngRowWriter&) = delete;
+  void write_row(const uint8_t* pixels);
+  /// Call after the last row.
+  void finish();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 /// The text chunks of a PNG file; empty if the file does not exist or is not a readable PNG file.
 std::map<std::string, std::string> read_png_texts(const std::string& path);

@@ -11,6 +11,7 @@
 
 #include "film/denoised_by.h"
 #include "film/outputs.h"
+#include "film/pictures.h"
 #include "film/splat_layer.h"
 
 namespace covary {
@@ -54,9 +55,8 @@ double samples_of(const ImageFacts& image) { return std::strtod(attribute(image,
 
 /// Of the picture.
 ColourSpace colours_of(const ImageFacts& image) {
-  const std::vector<ColourLayer> layers = colour_layers(image.info.channels);
-  const ColourLayer* picture = find_picture(layers);
-  return picture ? layer_colours(image.info.colours, picture->channels) : image.info.colours;
+  const std::vector<Picture> pictures = find_pictures(image.info.channels);
+  return pictures.empty() ? image.info.colours : layer_colours(image.info.colours, pictures[0].channels);
 }
 
 bool is_integer(const ImageFacts& image) {

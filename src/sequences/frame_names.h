@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // File names of sequences. A run of '#' stands for the frame number, padded to at least that many digits:
-// "out_####.exr" means out_0001.exr, out_0002.exr, …
+// "out_####.exr" means out_0001.exr, out_0002.exr, …; so do "out_%04d.exr" and "out_<frame>.exr".
 #pragma once
 
 #include <string>
@@ -17,18 +17,19 @@ struct FrameRange {
 /// Parses "7", "1-48" or "1-48:2"; false if the text is none of these, or a number is above 999,999.
 bool read_frame_range(const std::string& text, FrameRange& range);
 
-/// Whether the last component of the path contains a run of '#'.
+/// Whether the last component of the path has a place for the number.
 bool is_frame_pattern(const std::string& pattern);
 
-/// The same for an input, whose '#' may also be in a folder's name: "passes_####/crn.exr". False if a file has exactly
-/// that name.
+/// The same for an input, whose number may also be in a folder's name: "passes_####/crn.exr". False if a file has
+/// exactly that name, but for '#' in the last component.
 bool is_frame_pattern_of_input(const std::string& pattern);
 
-/// The path of a frame: replaces the last run of '#'. Throws Error(kUsage) if there is none.
+/// The path of a frame. Throws Error(kUsage) if the pattern has no place for the number.
 std::string frame_name(const std::string& pattern, int frame);
 
-/// Frame numbers of the existing files, ascending. Throws like frame_name(), and Error(kIo) if the folder cannot be
+/// Frame numbers of the existing files, ascending; `others`: names that differ in their number's digits or sign ("998"
+/// beside "####"), which are not frames; may be null. Throws like frame_name(), and Error(kIo) if the folder cannot be
 /// read.
-std::vector<int> frames_on_disk(const std::string& pattern);
+std::vector<int> frames_on_disk(const std::string& pattern, std::vector<std::string>* others = nullptr);
 
 }  // namespace covary

@@ -22,6 +22,15 @@ TEST(FrameNames, HaveAtLeastAsManyDigitsAsThePattern) {
   EXPECT_THROW(frame_name("out.exr", 1), Error);
 }
 
+TEST(FrameNames, MayBeWrittenAsOtherProgramsDo) {
+  EXPECT_EQ(frame_name("a/out_%04d.exr", 7), "a/out_0007.exr");
+  EXPECT_EQ(frame_name("out.%d.exr", 12), "out.12.exr");
+  EXPECT_EQ(frame_name("out.<frame>.exr", 7), "out.0007.exr") << "four digits, as Maya pads";
+  EXPECT_EQ(frame_name("100%d_##.exr", 7), "100%d_07.exr") << "'#' comes first";
+  EXPECT_TRUE(is_frame_pattern("a/out.%06d.exr"));
+  EXPECT_FALSE(is_frame_pattern("50%_done.exr"));
+}
+
 TEST(FrameRanges, AreOneFrameOrFirstToLastByStep) {
   FrameRange range;
   ASSERT_TRUE(read_frame_range("7", range));
