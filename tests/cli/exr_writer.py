@@ -68,3 +68,40 @@ def film(seed, groups=2, size=(4, 3), samples=2, value=1.0, frame=None, window=N
              "scene_hash": "abc", "settings": "path", "complete": "true"}
     facts.update(attributes)
     return exr(channels, frame or size, window, {f"covary:{k}": v for k, v in facts.items()}, {"samples": UINT})
+
+
+def multipart(parts, frame):
+    """The bytes of a file of parts, each a dictionary: name, channels (as above) and, if needed, view, window,
+    compression (a number; the pixels stay as they are)."""
+    heads, blocks = b"", []
+    for number, part in enumerate(parts):
+        window = part.get("window", (0, 0) + tuple(frame))
+        x0, y0, width, height = window
+        names = sorted(part["channels"])
+        listing = b"".join(n.encode() + b"\0" + struct.pack("<iB3xii", FLOAT, 0, 1, 1) for n in names) + b"\0"
+        text = {"name": part["name"], "type": "scanlineimage", **({"view": part["view"]} if "view" in part else {})}
+        heads += b"".join([
+            attribute("channels", "chlist", listing),
+            attribute("compression", "compression", bytes([part.get("compression", 0)])),
+            attribute("dataWindow", "box2i", box(*window)),
+            attribute("displayWindow", "box2i", box(0, 0, *frame)),
+            attribute("lineOrder", "lineOrder", b"\0"),
+            attribute("pixelAspectRatio", "float", struct.pack("<f", 1)),
+            attribute("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0)),
+            attribute("screenWindowWidth", "float", struct.pack("<f", 1)),
+            attribute("chunkCount", "int", struct.pack("<i", height)),
+        ] + [attribute(n, "string", t.encode()) for n, t in text.items()]) + b"\0"
+        rows = []
+        for y in range(height):
+            data = b"".join(struct.pack(f"<{width}f", *part["channels"][n][y * width:(y + 1) * width]) for n in names)
+            rows.append(struct.pack("<iii", number, y0 + y, len(data)) + data)
+        blocks.append(rows)
+    heads = struct.pack("<ii", 20000630, 2 | 0x1000) + heads + b"\0"
+    offset = len(heads) + 8 * sum(map(len, blocks))
+    tables = data = b""
+    for rows in blocks:
+        for row in rows:
+            tables += struct.pack("<Q", offset)
+            offset += len(row)
+            data += row
+    return heads + tables + data

@@ -93,7 +93,9 @@ class Results(KeptTest):
                                                         "auto")):
             self.good(*command, "--oidn", "off", "-o", "o.exr", "--overwrite")
             found, attributes = self.expect_kept("o.exr", a, but="RGBA")
-            self.assertEqual(found["A"], floats((x + y) / 2 for x, y in zip(a["A"], b["A"])))
+            mean = [(x + y) / 2 for x, y in zip(a["A"], b["A"])]  # of values between 0 and 1 with the mean 1/2
+            self.assertTrue(all(0 <= value <= 1 for value in found["A"]))
+            self.assertLess(sum((v - 0.5) ** 2 for v in found["A"]), 0.8 * sum((v - 0.5) ** 2 for v in mean))
             self.assertNotEqual(found["R"], a["R"])
             self.assertEqual(attributes["covary:seed"], b"1,2")
             self.assertNotEqual(attributes.get("covary:predicted_relmse"), b"123", "it describes the old image")
@@ -106,8 +108,6 @@ class Results(KeptTest):
             views.append({f"{view}.{c}": floats(chance.expovariate(1) for _ in range(N)) for view in ("left", "right")
                           for c in "RGB"})
             self.write(name, exr(views[-1], SIZE, attributes={"owner": "somebody"}))
-        self.bad(1, "several images; name one by its layer; images in it: 'left', 'right'", "denoise", "a.exr", "b.exr",
-                 "--oidn", "off", "-o", "o.exr")
         self.good("denoise", "a.exr", "b.exr", "--layer", "right", "--oidn", "off", "-o", "o.exr")
         found, attributes = self.read("o.exr")
         self.assertEqual([c for c in views[0] if found[c] == views[0][c]], ["left.R", "left.G", "left.B"])
@@ -278,7 +278,7 @@ class Frames(KeptTest):
         self.write("b_3.exr", exr(channels, SIZE, types={"object": UINT}))
         result = self.run_covary(*self.COMMAND)
         self.assertEqual(result.returncode, 1)
-        self.assertIn("warning: frame 3 failed: ", result.stderr)
+        self.assertIn("warning: frame 3 (3 of 5) failed: ", result.stderr)
         self.assertEqual(result.stderr.splitlines()[-1], "covary: 1 of 5 frames failed: 3")
         self.assertEqual(self.written(), ["o_1.exr", "o_2.exr", "o_4.exr", "o_5.exr"])
         self.assertIn("note: the frames have no layer 'Motion'", result.stderr)

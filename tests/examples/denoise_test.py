@@ -73,7 +73,7 @@ class Denoise(unittest.TestCase):
         self.run_in_folder(sys.executable, SOURCE / f"docs/examples/denoise_{RENDERER}.py", self.scene(), 8)
         guides = ("--albedo", "a.albedo.exr", "--normal", "a.normal.exr") if RENDERER == "luxcore" else ()
         said = self.run_in_folder(COVARY, "denoise", "a.exr", "b.exr", *guides, "-o", "out.exr", "--oidn", "off")
-        self.assertIn("of 2 groups, guided by albedo and normal", said)
+        self.assertIn("of 2 renders, guided by albedo and normal", said)
 
     def test_more_renders(self):
         """Of eight the predicted error has an interval."""
