@@ -79,15 +79,21 @@ class Search {
       const SurfacePoint at{to_world.point(local->p), normalize(to_world.normal(local->n))};
       const float spacing = spacing_at(at.p), most = kFewestSpacings * spacing;
       const float found = std::min(thickness(scene_, shape, at, at.n, most), thickness(scene_, shape, at, -at.n, most));
-      if (!(found < most)) continue;
-      named_.insert(&shape);
-      if (named_.size() <= kMostNamed)
-        warnings_.push_back(
-            fmt::format("{} is {:.2g} thick at ({:.7g}, {:.7g}, {:.7g}), where floats are {:.2g} apart: light that "
-                        "passes it may be wrong; expected at least {:.2g}, or a place nearer to the origin",
-                        name_of_(shape), found, at.p.x, at.p.y, at.p.z, spacing, most));
-      return;
+      if (found < most) return warn(shape, fmt::format("{:.2g} thick", found), at.p, "light that passes it", most);
     }
+    const float most = kFewestAcross * spacing_at(bounds.center()), across = 2 * bounds.radius();
+    if ((shape.bsdf_flags() & kTransmission) && across < most)
+      warn(shape, fmt::format("{:.2g} across", across), bounds.center(),
+           "light that passes it where it meets other surfaces", most);
+  }
+
+  void warn(const Shape& shape, const std::string& size, const Vec3& p, const char* what, float least) {
+    named_.insert(&shape);
+    if (named_.size() <= kMostNamed)
+      warnings_.push_back(
+          fmt::format("{} is {} at ({:.7g}, {:.7g}, {:.7g}), where floats are {:.2g} apart: {} may be "
+                      "wrong; expected at least {:.2g}, or a place nearer to the origin",
+                      name_of_(shape), size, p.x, p.y, p.z, spacing_at(p), what, least));
   }
 
   void finish() {
