@@ -15,8 +15,9 @@ class CoatedBsdf : public Bsdf {
   Spectrum albedo(const SurfaceHit& hit) const final { return clamp01(diffuse_.eval(hit)); }
 
  protected:
-  explicit CoatedBsdf(Parameters& p)
-      : diffuse_(p, "diffuse_reflectance", 0.5f), specular_(p, "specular_reflectance", 1) {
+  /// `specular`: default of specular_reflectance.
+  explicit CoatedBsdf(Parameters& p, float specular = 1)
+      : diffuse_(p, "diffuse_reflectance", 0.5f), specular_(p, "specular_reflectance", specular) {
     const float sum = diffuse_.mean() + specular_.mean();
     specular_weight_ = sum > 0 ? specular_.mean() / sum : 0.5f;
   }

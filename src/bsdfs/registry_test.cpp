@@ -13,7 +13,8 @@ TEST(BsdfRegistry, IsSortedWithoutRepetition) {
 }
 
 TEST(BsdfRegistry, EveryModelThatNeedsNothingElseHasDefaults) {
-  const std::set<std::string> needs_more{"blendbsdf", "bumpmap", "mask", "measured", "normalmap", "twosided"};
+  const std::set<std::string> needs_more{"blendbsdf", "bumpmap",   "coating",      "mask",
+                                         "measured",  "normalmap", "roughcoating", "twosided"};
   for (const Plugin<Bsdf>& plugin : bsdf_plugins()) {
     if (needs_more.count(plugin.name)) continue;
     const BsdfPtr bsdf = make_bsdf({{"type", plugin.name}});
