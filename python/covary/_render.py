@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from .estimators import Estimator
 
 PathOrScene = Union[str, "PathLike[str]", "Scene"]
-Filter = Literal["box", "tent", "gaussian"]
+Filter = Literal["box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos"]
 
 _SCALARS = optional(mapping_of(scalar, "a mapping from names to True, False, numbers or texts"))
 _CHECKPOINT_SECONDS = 300.0  # as the program
@@ -48,12 +48,13 @@ class Scene:
              integrator_options=_SCALARS, defines=_SCALARS, environment=either("a name or a file", path),
              background=optional(either("a grey, or (R, G, B), linear numbers", real(0),
                                         several("", real(0), real(0), real(0)))),
-             camera=either("a name or a number from 1", text, whole(1)))
+             camera=either("a name or a number from 1", text, whole(1)), ignore_unknown=flag)
     def load(path: str | PathLike[str], *, resolution: tuple[int, int] | None = None, integrator: str = "",
              min_depth: int | None = None, max_depth: int | None = None,
              integrator_options: Mapping[str, bool | int | float | str] | None = None,
              defines: Mapping[str, object] | None = None, environment: str | PathLike[str] = "auto",
-             background: float | tuple[float, float, float] | None = None, camera: str | int = "") -> Scene:
+             background: float | tuple[float, float, float] | None = None, camera: str | int = "",
+             ignore_unknown: bool = False) -> Scene:
         """Reads a scene: Mitsuba XML, pbrt or glTF; or "room" and the other scenes.names() that come with the package.
 
         resolution: (width, height) of the full frame, instead of the scene's.
@@ -65,6 +66,7 @@ class Scene:
             "none"; "auto" is a studio with a floor if the scene has no light, or, in glTF, none that matters.
         background: linear colour where the camera sees no surface; it sheds no light.
         camera: name or number, from 1, of one of the scene's cameras; "auto" frames everything.
+        ignore_unknown: unknown plugins and parameters are warnings; an unknown BSDF becomes grey.
         Raises InputError with every problem of the file.
         """
         texts = {name: str(value) for name, value in (defines or {}).items()}
@@ -72,7 +74,8 @@ class Scene:
                              "background": background, "camera": None if camera == "" else str(camera)})
         return Scene(_file_of(fspath(path)), {"defines": texts, "resolution": resolution, "integrator": integrator,
                                     "min_depth": min_depth, "max_depth": max_depth,
-                                    "integrator_options": dict(integrator_options or {}), "view": view})
+                                    "integrator_options": dict(integrator_options or {}), "view": view,
+                                    "ignore_unknown": ignore_unknown})
 
     @checked(integrator=text)
     def with_integrator(self, integrator: str) -> Scene:
@@ -250,6 +253,8 @@ def report_bad_samples(made: dict[str, Any], depth: int = 4) -> None:
 def _bad_sample(scene: Scene, bad: dict[str, Any]) -> BadSample:
     """The sample with the command that replays it: the options of the scene and its random numbers, without outputs."""
     defines = [word for name, value in scene._loading["defines"].items() for word in ("-D", f"{name}={value}")]
+    if scene._loading["ignore_unknown"]:
+        defines.append("--ignore-unknown")
     replay = shlex.join(["covary", "render", scene.path, *defines, *bad["replay"]])
     return BadSample(**{**bad, "replay": replay})
 

@@ -69,7 +69,7 @@ PassResult render_light_pass(const Scene& scene, const LightTracingIntegrator& i
   COVARY_CHECK(settings.pass >= kLightPass, "a light pass has random numbers of its own");
   COVARY_CHECK(integrator.traces_light(), "the integrator traces no light here");
   const uint32_t target = std::min(settings.spp.largest(), settings.limit);
-  SplatLayer layer(film, scene.has_film_response());
+  SplatLayer layer(film, scene.has_film_response() || settings.filter.kind == FilterKind::kLobed);
   const uint32_t begin = film.count(0, 0);
   PassLimits limits(settings, uint64_t{target - std::min(begin, target)} * kBundlePaths);
   PerThread<Worker> workers;

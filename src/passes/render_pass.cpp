@@ -141,7 +141,7 @@ void trace_pixels(const Scene& scene, const Integrator& integrator, const PassSe
     for (uint32_t s = pixel.begin; s < pixel.end; ++s, ++sample) {
       if (!is_good(sample->radiance, film.crop().x + pixel.x, film.crop().y + pixel.y, s, worker))
         sample->radiance = Spectrum(0);
-      sample->radiance = scene.on_film(sample->radiance);
+      sample->radiance = scene.on_film(sample->radiance) * film_weight(settings.filter, sample->random);
       if (!settings.estimate) film.add(pixel.x, pixel.y, sample->radiance);
     }
     if (!settings.estimate) continue;
@@ -269,8 +269,16 @@ Vec2 film_position(const FilterSettings& filter, int x, int y, const PathRandom&
     case FilterKind::kGaussian:
       return centre + Vec2{interval_to_gaussian(u.x, filter.stddev, filter.radius),
                            interval_to_gaussian(u.y, filter.stddev, filter.radius)};
+    case FilterKind::kLobed:
+      return centre + Vec2{filter.lobed->sample(u.x).offset, filter.lobed->sample(u.y).offset};
   }
   throw Error(ErrorCode::kInternal, "unknown reconstruction filter");
+}
+
+float film_weight(const FilterSettings& filter, const PathRandom& random) {
+  if (filter.kind != FilterKind::kLobed) return 1;
+  const Vec2 u = random.get_2d(0, Event::kPixel);
+  return filter.lobed->sample(u.x).weight * filter.lobed->sample(u.y).weight;
 }
 
 CameraSample camera_sample(const Scene& scene, const PassSettings& settings, int x, int y, uint64_t sample) {
@@ -341,7 +349,8 @@ ReplayedSample replay_sample(const Scene& scene, const Integrator& integrator, c
   PathContext context(integrator);
   CameraSample traced = camera_sample(scene, settings, x, y, sample);
   integrator.trace(scene, {&traced, 1}, context);
-  return {film_position(settings.filter, x, y, traced.random), scene.on_film(traced.radiance), context.n_rays};
+  const float weight = film_weight(settings.filter, traced.random);
+  return {film_position(settings.filter, x, y, traced.random), scene.on_film(traced.radiance) * weight, context.n_rays};
 }
 
 }  // namespace covary

@@ -150,7 +150,10 @@ ReplayedSample replay_sample(const Scene& scene, const Integrator& integrator, c
 /// pixel has less than half of the samples of another.
 uint32_t wave_end(uint32_t count, int groups);
 
-/// Position of a sample in pixels of the full frame, distributed around the pixel's centre like the filter.
+/// Position of a sample in pixels of the full frame, distributed around the pixel's centre like the filter, or like its
+/// magnitude if it has negative lobes.
 Vec2 film_position(const FilterSettings& filter, int x, int y, const PathRandom& random);
+/// The factor on what the film gets of the sample there: filter over density, 1 without negative lobes.
+float film_weight(const FilterSettings& filter, const PathRandom& random);
 
 }  // namespace covary

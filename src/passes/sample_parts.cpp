@@ -49,10 +49,12 @@ class PartTracer {
     worker.context.by_part.n_parts = parts_.size();
     if (!stopped() && !worker.samples.empty()) integrator_.trace(scene_, worker.samples, worker.context);
     for (size_t s = 0; s < worker.samples.size() && !stopped(); ++s) {
-      const bool good = enters(worker.samples[s].radiance);
-      for (size_t i = 0; i < parts_.size(); ++i)
-        parts_[i].add(worker.pixels[s], y,
-                      good ? scene_.on_film(worker.context.by_part.radiance[s * parts_.size() + i]) : Spectrum());
+      const float weight =
+          enters(worker.samples[s].radiance) ? film_weight(settings_.filter, worker.samples[s].random) : 0;
+      for (size_t i = 0; i < parts_.size(); ++i) {
+        const Spectrum& part = worker.context.by_part.radiance[s * parts_.size() + i];
+        parts_[i].add(worker.pixels[s], y, weight != 0 ? scene_.on_film(part) * weight : Spectrum());
+      }
     }
     worker.samples.clear(), worker.pixels.clear();
   }

@@ -26,6 +26,8 @@ double SplatFilter::density(double distance) const {
       return std::max(0.0, 1 - std::abs(distance) / radius) / radius;
     case FilterKind::kGaussian:
       return scale_ * std::exp(-distance * distance / (2.0 * filter_.stddev * filter_.stddev));
+    case FilterKind::kLobed:
+      return filter_.lobed->value(distance);
   }
   throw Error(ErrorCode::kInternal, "unknown reconstruction filter");
 }
@@ -36,15 +38,15 @@ SplatFilter::Choice SplatFilter::choose(double position, double u) const {
   const int first = static_cast<int>(std::floor(position - filter_.radius - 0.5)) + 1;
   const int last = static_cast<int>(std::floor(position + filter_.radius - 0.5));
   double sum = 0;
-  for (int pixel = first; pixel <= last; ++pixel) sum += density(pixel + 0.5 - position);
+  for (int pixel = first; pixel <= last; ++pixel) sum += std::abs(density(pixel + 0.5 - position));
   if (!(sum > 0)) return {};
   double left = u * sum;
   int chosen = first;
   for (; chosen < last; ++chosen) {
-    left -= density(chosen + 0.5 - position);
+    left -= std::abs(density(chosen + 0.5 - position));
     if (left < 0) break;
   }
-  return {chosen, static_cast<float>(sum)};
+  return {chosen, static_cast<float>(density(chosen + 0.5 - position) < 0 ? -sum : sum)};
 }
 
 SplatPixel SplatFilter::pixel(Vec2 film, Vec2 u) const {

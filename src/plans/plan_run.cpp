@@ -33,6 +33,8 @@ std::string filter_text(const FilterSettings& filter) {
       return fmt::format("tent radius={}", filter.radius);
     case FilterKind::kGaussian:
       return fmt::format("gaussian radius={} stddev={}", filter.radius, filter.stddev);
+    case FilterKind::kLobed:
+      return filter.lobed->text();
   }
   throw Error(ErrorCode::kInternal, "unknown reconstruction filter");
 }

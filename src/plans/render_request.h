@@ -106,7 +106,8 @@ inline void declare(Settings& s, RenderRequest& r) {
            "Random numbers within a group of samples: independent, or Owen-scrambled Sobol' points; default: the "
            "scene's (sobol unless it is independent)");
   if (!sampler.empty()) r.sampler = sampler == "sobol" ? Sampler::kSobol : Sampler::kIndependent;
-  s.one_of("rfilter", filter, {"box", "tent", "gaussian"}, "Reconstruction filter instead of the scene's");
+  s.one_of("rfilter", filter, {"box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos"},
+           "Reconstruction filter instead of the scene's");
   if (!filter.empty()) r.filter = filter_named(filter);
   s.group("Output");
   s.flag("overwrite", r.overwrite, "Replace existing films, and an `output` that another command made");

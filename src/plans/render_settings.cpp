@@ -76,6 +76,9 @@ std::string read_until(const std::string& text, RenderRequest& v) {
 FilterSettings filter_named(const std::string& name) {
   if (name == "box") return {FilterKind::kBox, 0.5f, 0};
   if (name == "tent") return {FilterKind::kTent, 1.0f, 0};
+  if (name == "mitchell") return lobed(LobedFilter::mitchell(1.0f / 3, 1.0f / 3));
+  if (name == "catmullrom") return lobed(LobedFilter::catmull_rom());
+  if (name == "lanczos") return lobed(LobedFilter::lanczos(3));
   return {FilterKind::kGaussian, 2.0f, 0.5f};
 }
 

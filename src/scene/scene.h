@@ -16,6 +16,7 @@
 #include "core/transform.h"
 #include "scene/camera.h"
 #include "scene/emitter.h"
+#include "scene/lobed_filter.h"
 #include "scene/shape.h"
 #include "scene/surface_hit.h"
 
@@ -55,14 +56,16 @@ struct SceneParts {
   std::string first_medium;  ///< location in the file of the first medium that is used; empty: there is none
 };
 
-enum class FilterKind { kBox, kTent, kGaussian };
-/// Reconstruction filter. Every sample contributes to one pixel only, with weight one: its position within the filter's
-/// footprint is sampled from the filter itself.
+enum class FilterKind { kBox, kTent, kGaussian, kLobed };
+/// Reconstruction filter. Every sample contributes to one pixel only: its position within the filter's footprint is
+/// sampled from the filter itself, so that its weight is one, or for kLobed of either sign.
 struct FilterSettings {
   FilterKind kind = FilterKind::kBox;
-  float radius = 0.5f;  ///< in pixels: box 0.5, tent 1, gaussian 4 standard deviations
-  float stddev = 0.5f;  ///< gaussian only
+  float radius = 0.5f;                 ///< in pixels: box 0.5, tent 1, gaussian 4 standard deviations
+  float stddev = 0.5f;                 ///< gaussian only
+  const LobedFilter* lobed = nullptr;  ///< kLobed only
 };
+inline FilterSettings lobed(const LobedFilter& filter) { return {FilterKind::kLobed, filter.radius(), 0, &filter}; }
 
 class RayTracer;
 
