@@ -20,11 +20,25 @@ Matrix4 multiply(const Matrix4& a, const Matrix4& b) {
   return c;
 }
 
+/// The inverse of a matrix that appears singular beside a large translation, but is not without it.
+Matrix4 inverted_affine(const EigenMatrix& m) {
+  const Eigen::FullPivLU<Eigen::Matrix3d> lu(Eigen::Matrix3d(m.topLeftCorner<3, 3>()));
+  if (m.row(3) != Eigen::RowVector4d(0, 0, 0, 1) || !lu.isInvertible())
+    throw Error(ErrorCode::kInput, "the transformation matrix is singular");
+  const Eigen::Matrix3d linear = lu.inverse();
+  EigenMatrix inverse = EigenMatrix::Identity();
+  inverse.topLeftCorner<3, 3>() = linear;
+  inverse.topRightCorner<3, 1>() = -linear * m.topRightCorner<3, 1>();
+  Matrix4 result;
+  Eigen::Map<EigenMatrix>(result[0].data()) = inverse;
+  return result;
+}
+
 Matrix4 inverted(const Matrix4& m) {
   const Eigen::Map<const EigenMatrix> a(m[0].data());
   const Eigen::FullPivLU<EigenMatrix> lu(a);
   if (!a.allFinite()) throw Error(ErrorCode::kInput, "the transformation matrix has an entry that is not finite");
-  if (!lu.isInvertible()) throw Error(ErrorCode::kInput, "the transformation matrix is singular");
+  if (!lu.isInvertible()) return inverted_affine(a);
   Matrix4 result;
   Eigen::Map<EigenMatrix>(result[0].data()) = lu.inverse();
   return result;

@@ -19,32 +19,95 @@
 
 #include "core/content_hash.h"
 #include "core/error.h"
+#include "core/git_lfs.h"
 #include "core/memory_limit.h"
 #include "core/parallel.h"
 
 namespace covary {
 namespace fs = std::filesystem;
 
+namespace {
+
+constexpr size_t kMostEntries = 2000;  // of a folder that are looked at
+
+/// Calls visit(path) for entries of the folder.
+template <typename Visit>
+void for_entries(const fs::path& folder, const Visit& visit) {
+  std::error_code error;
+  size_t n = 0;
+  for (fs::directory_iterator it(folder.empty() ? fs::path(".") : folder, error), end; !error && it != end;
+       it.increment(error)) {
+    if (++n > kMostEntries) break;
+    visit(it->path());
+  }
+}
+
+std::string lower_case(std::string text) {
+  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return text;
+}
+
+/// The file at `path` with letters of another case, as file systems of Windows and macOS find it; "" if there is none or
+/// more than one.
+fs::path in_other_case(const fs::path& path) {
+  std::error_code ignored;
+  fs::path found = path.root_path();
+  for (const fs::path& part : path.relative_path()) {
+    if (fs::exists(found / part, ignored)) {
+      found /= part;
+      continue;
+    }
+    std::vector<fs::path> alike;
+    for_entries(found, [&](const fs::path& entry) {
+      if (lower_case(entry.filename().string()) == lower_case(part.string())) alike.push_back(entry.filename());
+    });
+    if (alike.size() != 1) return {};
+    found /= alike[0];
+  }
+  return fs::is_regular_file(found, ignored) ? found : fs::path();
+}
+
+}  // namespace
+
 void FileResolver::add_folder(const std::string& folder) { folders_.insert(folders_.begin(), folder); }
 
 std::string FileResolver::resolve(const std::string& name, const SourceLocation& where, Diagnostics& diagnostics) {
-  std::vector<fs::path> candidates;
-  if (fs::path(name).is_absolute()) {
-    candidates.emplace_back(name);
-  } else {
-    for (const std::string& folder : folders_) candidates.push_back(fs::path(folder) / name);
-    candidates.push_back(fs::path(where.file).parent_path() / name);
+  const std::string path = find(name, where, diagnostics);
+  if (path.empty()) return "";
+  if (const std::string problem = git_lfs_problem(path); !problem.empty()) {
+    diagnostics.error(where, problem);
+    return "";
   }
+  const std::lock_guard lock(mutex_);
+  files_.emplace(path, name);
+  return path;
+}
+
+std::string FileResolver::find(const std::string& name, const SourceLocation& where, Diagnostics& diagnostics) const {
+  std::string portable = name;
   std::error_code ignored;
+  std::replace(portable.begin(), portable.end(), '\\', '/');
+  std::vector<fs::path> candidates;
+  for (const std::string& form : {name, portable}) {
+    if (fs::path(form).is_absolute()) {
+      candidates.emplace_back(form);
+    } else {
+      for (const std::string& folder : folders_) candidates.push_back(fs::path(folder) / form);
+      candidates.push_back(fs::path(where.file).parent_path() / form);
+      candidates.emplace_back(form);  // last: from where the program was started
+    }
+    if (portable == name) break;
+  }
   std::string other;  // something of that name that is not a regular file
   for (const fs::path& candidate : candidates) {
-    if (fs::is_regular_file(candidate, ignored)) {
-      const std::lock_guard lock(mutex_);
-      files_.emplace(candidate.string(), name);
-      return candidate.string();
-    }
+    if (fs::is_regular_file(candidate, ignored)) return candidate.string();
     if (other.empty() && fs::exists(candidate, ignored)) other = candidate.string();
   }
+  for (const fs::path& candidate : candidates)
+    if (const fs::path found = in_other_case(candidate); !found.empty()) {
+      diagnostics.warn(where, fmt::format("file '{}' is read as '{}'", name, found.string()));
+      return found.string();
+    }
   if (!other.empty()) {
     const bool folder = fs::is_directory(other, ignored);
     diagnostics.error(
@@ -60,12 +123,9 @@ std::string FileResolver::resolve(const std::string& name, const SourceLocation&
     const std::string shown = folder.empty() ? "." : folder.string();
     if (searched.find("'" + shown + "'") != std::string::npos) continue;
     searched += (searched.empty() ? "'" : ", '") + shown + "'";
-    size_t looked_at = 0;
-    for (fs::directory_iterator it(folder.empty() ? fs::path(".") : folder, ignored), end; !ignored && it != end;
-         it.increment(ignored)) {
-      if (++looked_at > 2000) break;
-      neighbours.push_back((fs::path(name).parent_path() / it->path().filename()).string());
-    }
+    for_entries(folder, [&](const fs::path& entry) {
+      neighbours.push_back((fs::path(portable).parent_path() / entry.filename()).string());
+    });
   }
   diagnostics.error(where, fmt::format("file '{}' not found in {}{}", name, searched, did_you_mean(name, neighbours)));
   return "";

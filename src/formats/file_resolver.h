@@ -17,10 +17,12 @@ namespace covary {
 /// have been added.
 class FileResolver {
  public:
-  /// Folders are searched in reverse order of addition, then the folder of the XML file that references the file.
+  /// Folders are searched in reverse order of addition, then the folder of the file that references the file, then the
+  /// working directory.
   void add_folder(const std::string& folder);
 
-  /// Path of the existing regular file `name`; records an error at `where` and returns "" if there is none.
+  /// Path of the existing regular file `name`; records an error at `where` and returns "" if there is none. Backslashes
+  /// may separate folders, and letters may differ in case, with a warning.
   std::string resolve(const std::string& name, const SourceLocation& where, Diagnostics& diagnostics);
 
   /// Every file that resolve() has found, by path, with the name used in the scene.
@@ -30,6 +32,8 @@ class FileResolver {
   std::string content_hash(const std::string& scene_hash) const;
 
  private:
+  std::string find(const std::string& name, const SourceLocation& where, Diagnostics& diagnostics) const;
+
   std::vector<std::string> folders_;
   mutable std::mutex mutex_;
   std::map<std::string, std::string> files_;
@@ -38,8 +42,8 @@ class FileResolver {
 /// The bytes of a file, memory-mapped for reading; those of a file named *.gz are uncompressed.
 class FileView {
  public:
-  /// Throws Error(kIo) if the file cannot be opened or is not a regular file; Error(kInput) if it is compressed and
-  /// damaged, or too large.
+  /// Throws Error(kIo) if the file cannot be opened or is not a regular file; Error(kInput) for a pointer of Git LFS, or
+  /// if the file is compressed and damaged, or too large.
   explicit FileView(const std::string& path);
   ~FileView();
   FileView(const FileView&) = delete;

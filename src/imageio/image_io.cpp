@@ -12,6 +12,7 @@
 #include <memory>
 
 #include "core/error.h"
+#include "core/git_lfs.h"
 #include "core/memory_limit.h"
 #include "imageio/exr_image.h"
 #include "imageio/image_module.h"
@@ -73,6 +74,7 @@ size_t size_of_readable(const std::string& path) {
   std::FILE* file = std::fopen(path.c_str(), "rb");
   if (!file) throw Error(ErrorCode::kIo, fmt::format("cannot read {}: {}", path, std::strerror(errno)));
   std::fclose(file);
+  if (const std::string problem = git_lfs_problem(path); !problem.empty()) throw Error(ErrorCode::kInput, problem);
   return std::filesystem::file_size(path, status);
 }
 

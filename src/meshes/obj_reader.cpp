@@ -82,6 +82,7 @@ class ObjReader {
  public:
   MeshFile read(std::string_view text) {
     std::string joined;
+    if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // byte order mark
     for (size_t start = 0, number = 1; start < text.size();) {
       const size_t first = number;
       Line line(next_line(text, start, number, joined), first);
