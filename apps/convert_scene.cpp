@@ -26,7 +26,7 @@ const SceneView kConvertedView{.environment = "auto"};
 
 struct ConvertSceneOptions {
   std::string input, output;
-  std::vector<std::string> defines;
+  SceneOptions scene_options;
   OptionValues view;
   bool overwrite = false;
 };
@@ -70,11 +70,10 @@ void convert_scene(const ConvertSceneOptions& options) {
   const bool special = output_target(options.output).is_special;
   std::error_code ignored;
   if (!options.overwrite && !special && fs::exists(options.output, ignored)) refuse(options.output);
-  LoadOptions load_options;
-  load_options.defines = parse_defines(options.defines);
-  load_options.make_integrator = integrator_maker({});
-  load_options.view = settings_from<SceneView>(options.view, kConvertedView);
-  const ConvertedScene scene = convert_scene(options.input, options.output, load_options);
+  LoadOptions loading = load_options(options.scene_options);
+  loading.make_integrator = integrator_maker({});
+  loading.view = settings_from<SceneView>(options.view, kConvertedView);
+  const ConvertedScene scene = convert_scene(options.input, options.output, loading);
   for (const std::string& file : scene.files)
     if (is_same_file(file, options.output))
       throw Error(ErrorCode::kUsage,
@@ -103,7 +102,7 @@ void add_convert_scene(CLI::App& app) {
             "OUT-files; other files stay where they are")
       ->option_text("OUT.xml")
       ->required();
-  add_define_option(*command, o->defines);
+  add_scene_options(*command, o->scene_options);
   add_options(*command, options_of<SceneView>(kConvertedView), o->view);
   command->add_flag("--overwrite", o->overwrite, "Replace OUT.xml and its files");
   command->callback([o] { convert_scene(*o); });

@@ -6,6 +6,7 @@
 
 #include "command_description.h"
 #include "core/error.h"
+#include "io/load_scene.h"
 #include "settings/option_names.h"
 #include "value_names.h"
 
@@ -74,22 +75,33 @@ void add_overwrite_option(CLI::App& command, bool& overwrite) {
   command.add_flag("--overwrite", overwrite, "Replace the output even if another command or program made it");
 }
 
-void add_define_option(CLI::App& command, std::vector<std::string>& defines) {
-  add_value(command, "-D,--define", defines, "name=value", "Value of one of the scene's <default> elements")
+void add_scene_options(CLI::App& command, SceneOptions& options) {
+  add_value(command, "-D,--define", options.defines, "name=value", "Value of one of the scene's <default> elements")
       ->take_all()
       ->expected(1)
       ->allow_extra_args(false);
+  command.add_flag("--ignore-unknown", options.ignore_unknown,
+                   "Warn of unknown plugins and parameters of the scene instead of refusing it; an unknown BSDF "
+                   "becomes grey");
 }
 
-std::map<std::string, std::string> parse_defines(const std::vector<std::string>& defines) {
-  std::map<std::string, std::string> result;
-  for (const std::string& define : defines) {
+LoadOptions load_options(const SceneOptions& options) {
+  LoadOptions result;
+  for (const std::string& define : options.defines) {
     const size_t equals = define.find('=');
     if (equals == 0 || equals == std::string::npos)
       throw Error(ErrorCode::kUsage, "-D '" + define + "': expected name=value");
-    result[define.substr(0, equals)] = define.substr(equals + 1);
+    result.defines[define.substr(0, equals)] = define.substr(equals + 1);
   }
+  result.ignore_unknown = options.ignore_unknown;
   return result;
+}
+
+std::vector<std::string> scene_words(const SceneOptions& options) {
+  std::vector<std::string> words;
+  for (const std::string& define : options.defines) words.insert(words.end(), {"-D", define});
+  if (options.ignore_unknown) words.emplace_back("--ignore-unknown");
+  return words;
 }
 
 }  // namespace covary

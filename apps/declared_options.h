@@ -3,13 +3,14 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <map>
 #include <string>
 #include <vector>
 
 #include "settings/option.h"
 
 namespace covary {
+
+struct LoadOptions;
 
 /// Adds the options to the command: values given on the command line are stored in `values`, by names without dashes,
 /// and checked against the declaration. `values` must outlive the command.
@@ -25,11 +26,15 @@ CLI::Option* add_value(CLI::App& command, const std::string& names, T& value, co
 /// --overwrite, for Outputs::writes_result().
 void add_overwrite_option(CLI::App& command, bool& overwrite);
 
-// -D name=value on the command line: values for the scene's <default> elements.
-
-void add_define_option(CLI::App& command, std::vector<std::string>& defines);
-
-/// Throws Error(kUsage) for a text that is not name=value.
-std::map<std::string, std::string> parse_defines(const std::vector<std::string>& defines);
+/// How a scene's file is read.
+struct SceneOptions {
+  std::vector<std::string> defines;  ///< name=value, for the <default> elements
+  bool ignore_unknown = false;
+};
+void add_scene_options(CLI::App& command, SceneOptions& options);
+/// Throws Error(kUsage) for a define that is not name=value.
+LoadOptions load_options(const SceneOptions& options);
+/// The options as words of a command.
+std::vector<std::string> scene_words(const SceneOptions& options);
 
 }  // namespace covary

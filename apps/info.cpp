@@ -15,6 +15,7 @@
 #include "io/load_scene.h"
 #include "io/scene_file.h"
 #include "json_output.h"
+#include "plans/integrator_choice.h"
 #include "plans/memory.h"
 #include "plans/render.h"
 #include "plans/render_settings.h"
@@ -26,7 +27,7 @@ namespace {
 
 struct InfoOptions {
   std::string path;
-  std::vector<std::string> defines;
+  SceneOptions scene_options;
   bool json = false;
 };
 
@@ -73,10 +74,10 @@ std::map<std::string, double> memory_of_renders(const LoadedScene& scene) {
 }
 
 void scene_info(const InfoOptions& options) {
-  LoadOptions load_options;
-  load_options.defines = parse_defines(options.defines);
-  load_options.view.environment = "auto";
-  const LoadedScene scene = load_scene(options.path, load_options);
+  LoadOptions loading = load_options(options.scene_options);
+  loading.make_integrator = integrator_maker({});  // what render would refuse is refused here
+  loading.view.environment = "auto";
+  const LoadedScene scene = load_scene(options.path, loading);
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));
   const std::map<std::string, double> memory = memory_of_renders(scene);
   if (options.json) {
@@ -117,7 +118,7 @@ void print_text(const ImageInfo& info, const std::string& path) {
 
 void info(const InfoOptions& options) {
   if (is_scene_file(options.path)) return scene_info(options);
-  if (!options.defines.empty()) throw Error(ErrorCode::kUsage, "-D is for scene files (.xml)");
+  if (!options.scene_options.defines.empty()) throw Error(ErrorCode::kUsage, "-D is for scene files (.xml)");
   const ImageInfo info = describe_image(options.path);
   if (options.json)
     print_json(info, options.path);
@@ -134,7 +135,7 @@ void add_info(CLI::App& app) {
   CLI::App* command = app.add_subcommand("info", "Describe a film, image or scene: size, channels, attributes");
   add_value(*command, "FILE", options->path, kFileValue, "A film or image, or a scene file (.xml, .pbrt, .glb, .gltf)")
       ->required();
-  add_define_option(*command, options->defines);
+  add_scene_options(*command, options->scene_options);
   command->add_flag("--json", options->json, "One JSON object");
   command->callback([options] { info(*options); });
 }

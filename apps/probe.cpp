@@ -41,9 +41,10 @@ struct ProbeOptions {
 
 /// A probe trains but renders no image: refuses options that only affect images, which the help leaves out.
 bool has_effect(const CLI::Option& option) {
-  static constexpr const char* kUsed[] = {"help",  "help-all", "output",  "integrator",    "resolution",   "crop",
-                                          "seed",  "define",   "threads", "quiet",         "no-preview",   "rfilter",
-                                          "pixel", "height",   "samples", "load-training", "save-training"};
+  static constexpr const char* kUsed[] = {"help",    "help-all",      "output",       "integrator",     "resolution",
+                                          "crop",    "seed",          "define",       "ignore-unknown", "threads",
+                                          "quiet",   "no-preview",    "rfilter",      "pixel",          "height",
+                                          "samples", "load-training", "save-training"};
   if (option.get_positional()) return true;
   for (const std::string& name : option.get_lnames())
     if (std::count(std::begin(kUsed), std::end(kUsed), name) > 0 || find_option(options_of_integrators(), name))

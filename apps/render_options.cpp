@@ -76,12 +76,11 @@ void check_integrator(const RenderOptions& options, const LoadedScene& scene) {
 }  // namespace
 
 LoadedScene load(const RenderOptions& options) {
-  LoadOptions load_options;
-  load_options.defines = parse_defines(options.defines);
-  load_options.width = options.settings.width, load_options.height = options.settings.height;
-  load_options.view = options.settings.view;
-  load_options.make_integrator = integrator_maker({options.settings.integrator, options.of_integrator});
-  LoadedScene scene = load_scene(options.scene, load_options);
+  LoadOptions loading = load_options(options.scene_options);
+  loading.width = options.settings.width, loading.height = options.settings.height;
+  loading.view = options.settings.view;
+  loading.make_integrator = integrator_maker({options.settings.integrator, options.of_integrator});
+  LoadedScene scene = load_scene(options.scene, loading);
   check_integrator(options, scene);
   for (std::string& warning : integrator_of(scene).blind_spots(*scene.scene))
     scene.warnings.push_back(std::move(warning));
@@ -156,7 +155,7 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
       ->transform(scene_file)
       ->required();
   add_options(command, options_of<RenderSettings>(), o.values);
-  add_define_option(command, o.defines);
+  add_scene_options(command, o.scene_options);
   add_threads_option(command, o.threads);
   add_value(command, "--json", o.json, kFileValue, "Statistics; '-': to standard output");
   command.add_flag("--quiet", o.quiet, "No progress and no summary");

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "declared_options.h"
 #include "plans/render_settings.h"
 #include "sequences/sequence_settings.h"
 
@@ -17,7 +18,7 @@ struct RenderOptions {
   OptionValues values, of_integrator, of_estimator, of_sequence;  ///< as given
   RenderSettings settings;                                        ///< the meaning of `values`, by check_options()
   SequenceSettings sequence;                                      ///< the same of `of_sequence`
-  std::vector<std::string> defines;
+  SceneOptions scene_options;
   int threads = 0;
   bool quiet = false;
 

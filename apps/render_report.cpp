@@ -26,7 +26,7 @@ namespace {
 /// Command that replays one sample of a pass: the user's own, with the sample instead of the outputs.
 std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSample& bad) {
   std::vector<std::string> words = {"covary", "render", o.scene};
-  for (const std::string& define : o.defines) words.insert(words.end(), {"-D", define});
+  for (std::string& word : scene_words(o.scene_options)) words.push_back(std::move(word));
   OptionValues given = o.values;
   given.insert(o.of_integrator.begin(), o.of_integrator.end());
   const int frame = o.sequence.is_sequence() ? o.sequence.frames->first : 0;

@@ -210,9 +210,13 @@ def _define_plugins(mi: Any) -> None:
 
 
 def _integrator(mi: Any, scene: Any, given: Any) -> Any:
-    integrator = scene.integrator() if given is None else mi.load_dict(given) if isinstance(given, dict) else given
+    integrator = scene.integrator() if given is None else given
+    if integrator is None:  # of a scene made by load_dict(); files get the same one
+        integrator = "path"
     if isinstance(integrator, str):
-        integrator = mi.load_dict({"type": integrator})
+        integrator = {"type": integrator}
+    if isinstance(integrator, dict):
+        integrator = mi.load_dict(integrator)
     name = type(integrator).__name__
     if isinstance(integrator, mi.AdjointIntegrator):
         raise UsageError(f"the integrator {name} follows light to pixels anywhere, so that no random numbers belong to "
@@ -275,7 +279,8 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
 
     scene: a mitsuba.Scene, or the name of an XML file.
     spp: samples per pixel, of both images together.
-    integrator: instead of the scene's; an Integrator, its name, or a dictionary for mitsuba.load_dict().
+    integrator: instead of the scene's; an Integrator, its name, or a dictionary for mitsuba.load_dict(). A scene without
+        one is rendered by "path", as Mitsuba does with files.
     sensor: its index in the scene.
     groups: number of groups of samples in each image; fewer if there are fewer samples.
     aovs: also render albedo and shading normals, "Albedo" and "N", and those seen in mirrors and through glass,

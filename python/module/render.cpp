@@ -38,11 +38,13 @@ struct SceneChoice {
   std::string integrator;
   std::optional<int> min_depth, max_depth;
   Options view;  ///< of SceneView
+  bool ignore_unknown = false;
 };
 
 std::shared_ptr<LoadedScene> load(const std::string& path, const SceneChoice& choice, nb::dict integrator_options) {
   LoadOptions options;
   options.defines = choice.defines;
+  options.ignore_unknown = choice.ignore_unknown;
   if (choice.resolution) {
     options.width = choice.resolution->first, options.height = choice.resolution->second;
   }
@@ -212,14 +214,15 @@ void bind_render(nb::module_& module) {
       "load_scene",
       [](const std::string& path, const Options& defines, std::optional<std::pair<int, int>> resolution,
          const std::string& integrator, std::optional<int> min_depth, std::optional<int> max_depth,
-         nb::dict integrator_options, const Options& view) {
-        return load(path, {defines, resolution, integrator, min_depth, max_depth, view}, integrator_options);
+         nb::dict integrator_options, const Options& view, bool ignore_unknown) {
+        return load(path, {defines, resolution, integrator, min_depth, max_depth, view, ignore_unknown},
+                    integrator_options);
       },
       "path"_a, "defines"_a, "resolution"_a.none(), "integrator"_a, "min_depth"_a.none(), "max_depth"_a.none(),
-      "integrator_options"_a, "view"_a,
+      "integrator_options"_a, "view"_a, "ignore_unknown"_a,
       nb::sig("def load_scene(path: str, defines: dict[str, str], resolution: tuple[int, int] | None, integrator: str, "
               "min_depth: int | None, max_depth: int | None, integrator_options: dict[str, typing.Any], "
-              "view: dict[str, str]) -> LoadedScene"));
+              "view: dict[str, str], ignore_unknown: bool) -> LoadedScene"));
   module.def(
       "render",
       [](const std::shared_ptr<LoadedScene>& scene, const Options& values, const Options& of_integrator,

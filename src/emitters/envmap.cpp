@@ -96,6 +96,7 @@ std::shared_ptr<Emitter> make_envmap(Parameters& parameters) {
   const Transform to_world = parameters.get_transform("to_world");
   try {
     rotation = Rotation(to_world);
+    if (rotation.is_nearest()) parameters.warn("'to_world' scales axes unevenly; it is read as the nearest rotation");
   } catch (const Error& error) {
     parameters.error_at("to_world", error.what());
   }

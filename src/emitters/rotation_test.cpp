@@ -20,6 +20,13 @@ TEST(Rotation, KeepsLengthsAndInverts) {
   }
 }
 
+TEST(Rotation, SmallDistortionsAreRemoved) {
+  const Rotation rotation(Transform::rotate({0, 1, 0}, 30) * Transform::scale({1, 1.01f, 1.015f}));
+  EXPECT_TRUE(rotation.is_nearest());
+  EXPECT_LT(length(rotation.to_world({0, 0, 1}) - Transform::rotate({0, 1, 0}, 30).vector({0, 0, 1})), 1e-6f);
+  EXPECT_FALSE(Rotation(Transform::scale({3, 3.001f, 3})).is_nearest());
+}
+
 TEST(Rotation, RejectsWhatDistortsDirections) {
   for (const Vec3& scale : {Vec3{1, 2, 1}, Vec3{1, 1, 0.9f}}) {
     try {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "formats/spectrum_objects.h"
 
-#include <fmt/format.h>
+#include <algorithm>
 
+#include "formats/object_builder.h"
 #include "formats/xml_values.h"
 
 namespace covary {
@@ -22,8 +23,29 @@ std::vector<double> numbers(Parameters& p, const std::string& name) {
   return result;
 }
 
+/// The vector of a writer that knows three numbers but no colours is one.
 ColourValue colour(Parameters& p, const std::string& name) {
+  for (const Property& property : p.object().properties)
+    if (const Vec3* v = std::get_if<Vec3>(&property.value); v && property.name == name)
+      return p.get_vec3(name, {}), ColourValue{{v->x, v->y, v->z}};
   return {p.get_spectrum(name, Spectrum(1), SpectrumRole::kEmission)};
+}
+
+/// The nested texture, if any.
+const Property* texture_of(const ObjectDescription& object) {
+  for (const Property& property : object.properties)
+    if (const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value))
+      if (*child && (*child)->kind == "texture") return &property;
+  return nullptr;
+}
+
+/// d65 times a texture is the texture here: D65 is the white of linear RGB.
+Value scaled_texture(Parameters& p, const Property& texture) {
+  p.holds_object(texture.name);
+  const float scale = p.get_float("scale", 1);
+  if (scale == 1) return texture.value;
+  return ObjectPtr(
+      make_object("texture", "scale", p.object().where, {{"", texture.value}, {"scale", static_cast<double>(scale)}}));
 }
 
 const std::vector<std::string> kTypes = {"blackbody", "d65", "irregular", "regular", "rgb", "srgb", "uniform"};
@@ -34,6 +56,7 @@ Value read(const std::string& type, Parameters& p) {
   if (type == "rgb") return colour(p, "value");
   if (type == "srgb") return colour(p, "color");
   if (type == "d65") {
+    if (const Property* texture = texture_of(p.object())) return scaled_texture(p, *texture);
     const ColourValue base = colour(p, "color");
     return ColourValue{base.rgb * p.get_float("scale", 1)};
   }
@@ -57,14 +80,11 @@ Value read(const std::string& type, Parameters& p) {
 
 }  // namespace
 
+const std::vector<std::string>& spectrum_types() { return kTypes; }
+
+bool is_spectrum_type(std::string_view type) { return std::find(kTypes.begin(), kTypes.end(), type) != kTypes.end(); }
+
 Value spectrum_value(const ObjectPtr& object, Diagnostics& diagnostics) {
-  if (std::find(kTypes.begin(), kTypes.end(), object->type) == kTypes.end()) {
-    std::string list;
-    for (const std::string& type : kTypes) list += (list.empty() ? "'" : ", '") + type + "'";
-    diagnostics.error(object->where, fmt::format("unknown spectrum '{}'{}; supported: {}", object->type,
-                                                 did_you_mean(object->type, kTypes), list));
-    return ObjectPtr();
-  }
   NoObjects factory;
   Parameters parameters(*object, factory, diagnostics);
   try {

@@ -6,6 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "formats/xml_values.h"
 
 namespace covary {
 namespace {
@@ -73,6 +77,44 @@ void upgrade_bitmap(ObjectDescription& object) {
   remove(object, "cache");
 }
 
+/// Mitchell's B and C are called A and B today.
+void upgrade_mitchell(ObjectDescription& object) {
+  if (!find(object, "C")) return;
+  rename(object, "B", "A");
+  rename(object, "C", "B");
+}
+
+/// Media whose density is a volume, and volumes that know their place.
+void upgrade_volume(ObjectDescription& object) {
+  if (object.kind == "medium") {
+    rename(object, "density", "sigma_t");
+    for (const char* name : {"method", "step_size"}) remove(object, name);
+  } else if (object.type == "gridvolume") {
+    remove(object, "send_data");
+    if (!find(object, "use_grid_bbox")) object.properties.push_back({"use_grid_bbox", true, object.where});
+  }
+}
+
+void upgrade_film(ObjectDescription& object, Diagnostics& diagnostics) {
+  if (object.type == "ldrfilm") {
+    diagnostics.warn(object.where, "film 'ldrfilm' is read as 'hdrfilm'");
+    object.type = "hdrfilm";
+    for (const char* name :
+         {"gamma", "banner", "file_format", "pixel_format", "exposure", "tonemap_method", "key", "burn"})
+      remove(object, name);
+  } else if (object.type == "mfilm") {
+    diagnostics.warn(object.where, "film 'mfilm' is read as 'hdrfilm'");
+    object.type = "hdrfilm";
+    for (const char* name : {"digits", "variable", "file_format", "pixel_format"}) remove(object, name);
+  } else if (object.type == "tiledhdrfilm") {
+    object.type = "hdrfilm";
+  }
+  // "luminanceAlpha", or one format for each of several channels.
+  if (Property* format = find(object, "pixel_format"))
+    if (std::string* text = std::get_if<std::string>(&format->value))
+      *text = text->find_first_of(", ") == std::string::npos ? snake_case(*text) : "multichannel";
+}
+
 /// eta and k were divided by the external index; in practice only "air" occurs.
 void upgrade_conductor(ObjectDescription& object) {
   Property* const outside = find(object, "ext_eta");
@@ -81,6 +123,18 @@ void upgrade_conductor(ObjectDescription& object) {
   const auto value = number(outside);
   if ((value && std::abs(*value - 1) < 1e-3) || (name && (*name == "air" || *name == "vacuum")))
     remove(object, "ext_eta");
+}
+
+/// The cosine lobes of Phong and of Ashikhmin and Shirley, with a roughness that makes them like Beckmann's.
+void upgrade_distribution(ObjectDescription& object, Diagnostics& diagnostics) {
+  Property* property = find(object, "distribution");
+  std::string* name = property ? std::get_if<std::string>(&property->value) : nullptr;
+  if (!name || (*name != "phong" && *name != "as")) return;
+  diagnostics.warn(property->where,
+                   fmt::format("the distribution '{}' of bsdf '{}' is read as 'beckmann', to which its "
+                               "roughness makes it similar",
+                               *name, object.type));
+  *name = "beckmann";
 }
 
 void drop(ObjectDescription& object, std::initializer_list<std::string_view> names, Diagnostics& diagnostics) {
@@ -112,24 +166,92 @@ void upgrade_object(ObjectDescription& object, Diagnostics& diagnostics) {
   for (Property& property : object.properties) property.name = snake_case(property.name);
   upgrade_uv(object);
   if (object.kind == "bsdf") {
+    upgrade_distribution(object, diagnostics);
     if (object.type == "diffuse") rename(object, "diffuse_reflectance", "reflectance");
     if (object.type == "conductor" || object.type == "roughconductor") upgrade_conductor(object);
   } else if (object.kind == "texture") {
     if (object.type == "bitmap") upgrade_bitmap(object);
     if (object.type == "vertexcolors") object.type = "vertexcolor";
   } else if (object.kind == "film") {
-    if (object.type == "ldrfilm") {
-      diagnostics.warn(object.where, "film 'ldrfilm' is read as 'hdrfilm'");
-      object.type = "hdrfilm";
-      for (const char* name :
-           {"gamma", "banner", "file_format", "pixel_format", "exposure", "tonemap_method", "key", "burn"})
-        remove(object, name);
-    }
+    upgrade_film(object, diagnostics);
     drop(object, {"attach_log"}, diagnostics);
+  } else if (object.kind == "rfilter" && object.type == "mitchell") {
+    upgrade_mitchell(object);
+  } else if (object.kind == "medium" || object.kind == "volume") {
+    upgrade_volume(object);
   } else if (object.kind == "integrator") {
     drop(object, {"strict_normals"}, diagnostics);
   } else if (object.kind == "shape") {
     drop(object, {"collapse"}, diagnostics);
+  }
+}
+
+namespace {
+
+/// The numbers of `weights`, one for each nested model; empty after recording an error.
+std::vector<double> mixture_weights(const ObjectDescription& object, size_t n, Diagnostics& diagnostics) {
+  const auto fail = [&](const std::string& message) {
+    diagnostics.error(object.where, "bsdf 'mixturebsdf': " + message);
+    return std::vector<double>();
+  };
+  const auto property = std::find_if(object.properties.begin(), object.properties.end(),
+                                     [](const Property& p) { return p.name == "weights"; });
+  const std::string* text = property == object.properties.end() ? nullptr : std::get_if<std::string>(&property->value);
+  if (!text) return fail("the string 'weights' is missing");
+  try {
+    std::vector<double> weights = parse_numbers(*text, n);
+    const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
+    if (weights.empty() || !(sum > 0) || *std::min_element(weights.begin(), weights.end()) < 0)
+      return fail("its weights must not be negative, nor all 0");
+    if (sum > 1)  // as Mitsuba 0.6 does to conserve energy
+      for (double& weight : weights) weight /= sum;
+    return weights;
+  } catch (const Error& error) {
+    return fail(fmt::format("of {} nested models: weights {}", n, error.what()));
+  }
+}
+
+}  // namespace
+
+void expand_mixture(ObjectDescription& object, std::vector<std::shared_ptr<ObjectDescription>>& objects,
+                    Diagnostics& diagnostics) {
+  std::vector<Property> nested;
+  for (const Property& property : object.properties)
+    if (std::holds_alternative<ObjectPtr>(property.value)) nested.push_back(property);
+  const std::vector<double> weights = mixture_weights(object, nested.size(), diagnostics);
+  // From the last model up, each is blended with the mixture of those before it; less than 1 in all is black.
+  const auto make = [&](const char* type, std::vector<Property> properties) {
+    auto made = std::make_shared<ObjectDescription>();
+    made->kind = "bsdf", made->type = type, made->where = object.where, made->properties = std::move(properties);
+    objects.push_back(made);
+    return Property{"", ObjectPtr(made), object.where};
+  };
+  const auto parts = [&](const Property& first, const Property& second, double weight) {
+    std::vector<Property> properties{first, second, {"weight", weight, object.where}};
+    properties[0].name = properties[1].name = "";
+    return properties;
+  };
+  object.type = "blendbsdf";
+  if (weights.empty()) {
+    object.type = "diffuse", object.properties.clear();  // the error is recorded
+    return;
+  }
+  const double rest = 1 - std::accumulate(weights.begin(), weights.end(), 0.0);
+  double sum = rest > 1e-6 ? rest : 0;
+  Property mixed = sum > 0 ? make("diffuse", {{"reflectance", 0.0, object.where}}) : nested[0];
+  size_t i = sum > 0 ? 0 : 1;
+  if (i == 1) sum = weights[0];
+  if (i == nested.size()) {  // one model with all the weight
+    object.properties = parts(nested[0], nested[0], 0);
+    return;
+  }
+  for (; i < nested.size(); ++i) {
+    sum += weights[i];
+    std::vector<Property> both = parts(mixed, nested[i], sum > 0 ? weights[i] / sum : 0);
+    if (i + 1 == nested.size())
+      object.properties = std::move(both);
+    else
+      mixed = make("blendbsdf", std::move(both));
   }
 }
 

@@ -12,4 +12,9 @@ std::string snake_case(std::string_view name);
 /// of the output file, …) are dropped with a warning.
 void upgrade_object(ObjectDescription& object, Diagnostics& diagnostics);
 
+/// Turns a bsdf 'mixturebsdf' of any number of models into nested ones of two, 'blendbsdf'; new ones are added to
+/// `objects`.
+void expand_mixture(ObjectDescription& object, std::vector<std::shared_ptr<ObjectDescription>>& objects,
+                    Diagnostics& diagnostics);
+
 }  // namespace covary

@@ -140,8 +140,8 @@ XmlAttributes::XmlAttributes(pugi::xml_node element, const SourceLocation& where
   for (const pugi::xml_attribute& attribute : element.attributes()) {
     const std::string name = attribute.name();
     if (std::find(names.begin(), names.end(), name) == names.end()) {
-      diagnostics.error(
-          where, fmt::format("unknown attribute '{}' of <{}>{}", name, element.name(), did_you_mean(name, names)));
+      diagnostics.unknown(where, fmt::format("attribute '{}' of <{}>", name, element.name()),
+                          did_you_mean(name, names));
       continue;
     }
     if (find(name)) {

@@ -18,6 +18,15 @@ Vec3 to_vec3(const std::vector<double>& v) {
 /// Any direction orthogonal to `d`.
 Vec3 some_orthogonal(const Vec3& d) { return std::abs(d.x) > std::abs(d.y) ? Vec3{-d.z, 0, d.x} : Vec3{0, d.z, -d.y}; }
 
+/// A scale that flattens one axis, which exporters write for planes, leaves a thickness far below the rounding errors of
+/// the others instead of none, so that normals stay defined.
+Vec3 thin(Vec3 scale) {
+  const int n_zero = (scale.x == 0) + (scale.y == 0) + (scale.z == 0);
+  for (int i = 0; i < 3 && n_zero == 1; ++i)
+    if (scale[i] == 0) scale[i] = 1e-9f * std::max({std::abs(scale.x), std::abs(scale.y), std::abs(scale.z)});
+  return scale;
+}
+
 Vec3 read_xyz(const XmlAttributes& attributes, const std::string& tag, double missing) {
   if (const std::string* value = attributes.find("value")) {
     if (attributes.find("x") || attributes.find("y") || attributes.find("z"))
@@ -92,6 +101,8 @@ Property PropertyReader::read(const XmlDocument& document, pugi::xml_node node) 
 Value PropertyReader::read_spectrum(const XmlAttributes& attributes, const SourceLocation& where) {
   const std::string *value = attributes.find("value"), *filename = attributes.find("filename");
   if (!value == !filename) throw Error(ErrorCode::kInput, "<spectrum> takes either value or filename");
+  if (value && old_)
+    if (const auto triple = parse_spectrum_triple(*value)) return *triple;
   if (value) return parse_spectrum(*value);
   const std::string path = files_.resolve(*filename, where, diagnostics_);
   if (path.empty()) throw Error(ErrorCode::kInput, "");
@@ -144,7 +155,7 @@ Transform PropertyReader::read_operation(pugi::xml_node node, const std::string&
     return attributes;
   };
   if (tag == "translate") return Transform::translate(read_xyz(read({"value", "x", "y", "z"}), tag, 0));
-  if (tag == "scale") return Transform::scale(read_xyz(read({"value", "x", "y", "z"}), tag, 1));
+  if (tag == "scale") return Transform::scale(thin(read_xyz(read({"value", "x", "y", "z"}), tag, 1)));
   if (tag == "rotate") {
     const XmlAttributes attributes = read({"!angle", "value", "x", "y", "z"});
     const Vec3 axis = read_xyz(attributes, tag, 0);

@@ -17,8 +17,9 @@ const std::vector<std::string>& transform_tags();
 /// Reads elements that hold one value: numbers, strings, points, colours, spectra and transforms.
 class PropertyReader {
  public:
-  PropertyReader(XmlDefines& defines, FileResolver& files, Diagnostics& diagnostics)
-      : defines_(defines), files_(files), diagnostics_(diagnostics) {}
+  /// `old`: the file is of version 0.x or 1.x.
+  PropertyReader(XmlDefines& defines, FileResolver& files, Diagnostics& diagnostics, bool old)
+      : defines_(defines), files_(files), diagnostics_(diagnostics), old_(old) {}
 
   /// The property described by `node`. After recording an error its value is a null ObjectPtr, which keeps the
   /// parameter known, but without a value.
@@ -35,6 +36,7 @@ class PropertyReader {
   XmlDefines& defines_;
   FileResolver& files_;
   Diagnostics& diagnostics_;
+  bool old_;
 };
 
 }  // namespace covary

@@ -28,12 +28,22 @@ constexpr size_t kMaxObjects = 1000000;
 constexpr size_t kMaxNesting = 64;
 constexpr int kNewestVersion = 3;
 
-const std::vector<std::string> kObjectTags = {"scene",  "bsdf",  "texture", "emitter",    "shape",
-                                              "sensor", "film",  "rfilter", "integrator", "sampler",
-                                              "medium", "phase", "volume",  "subsurface"};
+const std::vector<std::string> kObjectTags = {"scene",  "bsdf",       "texture",    "emitter",  "shape",  "sensor",
+                                              "film",   "rfilter",    "integrator", "sampler",  "medium", "phase",
+                                              "volume", "subsurface", "camera",     "luminaire"};
 const std::vector<std::string> kOtherTags = {"boolean", "integer", "float",    "string",    "point",    "vector",
                                              "rgb",     "srgb",    "spectrum", "blackbody", "include",  "alias",
                                              "default", "path",    "ref",      "transform", "animation"};
+
+/// What an element of this tag and type describes: colours may be written as textures, as Mitsuba's own writer does, and
+/// textures as spectra. The first versions of Mitsuba had other names for sensors and emitters.
+std::string kind_of(std::string_view tag, std::string_view type) {
+  if (tag == "spectrum" || (tag == "texture" && type != "uniform"))
+    return is_spectrum_type(type) ? "spectrum" : "texture";
+  if (tag == "camera") return "sensor";
+  if (tag == "luminaire") return "emitter";
+  return std::string(tag);
+}
 
 bool contains(const std::vector<std::string>& names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();
@@ -58,8 +68,9 @@ class Reader {
     }
     if (!holder->properties.empty()) {
       resolve_references(objects_, std::move(ids_), aliases_, diagnostics_);
-      limit_expansion(break_cycles(objects_, diagnostics_), kMaxNesting, diagnostics_);
-      evaluate_spectra();
+      const std::vector<ObjectDescription*> ordered = break_cycles(objects_, diagnostics_);
+      limit_expansion(ordered, kMaxNesting, diagnostics_);
+      evaluate_spectra(ordered);
       defines_.report_unused(name, diagnostics_);
       result.scene = std::get<ObjectPtr>(holder->properties[0].value);
     }
@@ -174,8 +185,11 @@ class Reader {
                      size_t nesting) {
     for (const pugi::xml_node child : node.children()) {
       if (child.type() == pugi::node_pcdata || child.type() == pugi::node_cdata) {
-        diagnostics_.error(document.xml.where(node),
-                           fmt::format("<{}> holds text; parameters are elements", node.name()));
+        if (diagnostics_.ignores_unknown())
+          diagnostics_.unknown(document.xml.where(node), fmt::format("text in <{}>", node.name()), "");
+        else
+          diagnostics_.error(document.xml.where(node),
+                             fmt::format("<{}> holds text; parameters are elements", node.name()));
         continue;
       }
       if (child.type() != pugi::node_element) continue;
@@ -207,8 +221,8 @@ class Reader {
                          : XmlAttributes(node, where, defines_, {"version", "!type", "id", "name"}, diagnostics_))
              : XmlAttributes(node, where, defines_, {"!type", "id", "name"}, diagnostics_);
     auto object = std::make_shared<ObjectDescription>();
-    object->kind = node.name();
     object->type = is_scene ? "scene" : attributes.get("type");
+    object->kind = kind_of(node.name(), object->type);
     object->id = attributes.get("id");
     object->where = where;
     objects_.push_back(object);
@@ -221,6 +235,7 @@ class Reader {
     }
     read_children(document, node, *object, depth, nesting);
     if (document.old) upgrade_object(*object, diagnostics_);
+    if (object->kind == "bsdf" && object->type == "mixturebsdf") expand_mixture(*object, objects_, diagnostics_);
     // A missing type was reported; users of the object must not report it again.
     add(parent, {attributes.get("name"), attributes.complete() ? ObjectPtr(object) : ObjectPtr(), where});
   }
@@ -240,7 +255,7 @@ class Reader {
     } else if (!contains(kOtherTags, tag)) {
       std::vector<std::string> tags = kOtherTags;
       tags.insert(tags.end(), kObjectTags.begin(), kObjectTags.end());
-      diagnostics_.error(where, fmt::format("unknown element <{}>{}", tag, did_you_mean(tag, tags)));
+      diagnostics_.unknown(where, fmt::format("element <{}>", tag), did_you_mean(tag, tags));
     } else if (tag == "default") {
       const XmlAttributes attributes(node, where, defines_, {"!name", "!value"}, diagnostics_);
       if (!attributes.complete()) return;
@@ -261,7 +276,7 @@ class Reader {
       reference->kind = "ref", reference->id = attributes.get("id"), reference->where = where;
       add(owner, {attributes.get("name"), ObjectPtr(reference), where});
     } else {
-      add(owner, PropertyReader(defines_, files_, diagnostics_).read(document.xml, node));
+      add(owner, PropertyReader(defines_, files_, diagnostics_, document.old).read(document.xml, node));
     }
   }
 
@@ -295,14 +310,19 @@ class Reader {
     return true;
   }
 
-  /// Replaces <spectrum type="…"> objects by plain values wherever they are used.
-  void evaluate_spectra() {
-    for (const auto& object : objects_) {
-      for (Property& property : object->properties) {
-        const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
-        if (child && *child && (*child)->kind == "spectrum")
-          property.value = spectrum_value(ObjectPtr(*child), diagnostics_);
-      }
+  /// Replaces <spectrum type="…"> objects by plain values wherever they are used. `objects`: each after what it holds.
+  void evaluate_spectra(const std::vector<ObjectDescription*>& objects) {
+    const auto is_spectrum = [](const Property& property) {
+      const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
+      return child && *child && (*child)->kind == "spectrum";
+    };
+    for (ObjectDescription* object : objects) {
+      for (Property& property : object->properties)
+        if (is_spectrum(property)) {
+          Value value = spectrum_value(std::get<ObjectPtr>(property.value), diagnostics_);
+          if (object->kind != "scene") property.value = std::move(value);  // there, it waits for references
+        }
+      if (object->kind == "scene") std::erase_if(object->properties, is_spectrum);
     }
   }
 

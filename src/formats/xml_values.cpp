@@ -5,6 +5,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 
 #include "core/srgb.h"
 
@@ -26,12 +27,13 @@ std::string shown(std::string_view text) {
   return text.size() > 60 ? std::string(text.substr(0, 57)) + "..." : std::string(text);
 }
 
+/// Zero, or why the text is not the text of a number: result_out_of_range or invalid_argument.
 template <typename T>
-bool read(std::string_view text, T& value) {
+std::errc read(std::string_view text, T& value) {
   text = trim(text);
   if (!text.empty() && text.front() == '+') text.remove_prefix(1);
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size();
+  return end == text.data() + text.size() ? error : std::errc::invalid_argument;
 }
 
 float to_float(double v) {
@@ -76,14 +78,23 @@ std::vector<std::string_view> split_list(std::string_view text) {
 
 double parse_number(std::string_view text) {
   double value = 0;
-  if (!read(text, value)) fail(fmt::format("'{}' is not a number", shown(text)));
+  const std::errc error = read(text, value);
+  if (error == std::errc::result_out_of_range) {
+    value = std::strtod(std::string(trim(text)).c_str(), nullptr);  // 0 if it is too small
+    if (!std::isfinite(value)) fail(fmt::format("'{}' is too large", shown(text)));
+    return value;
+  }
+  if (error != std::errc()) fail(fmt::format("'{}' is not a number", shown(text)));
   if (!std::isfinite(value)) fail(fmt::format("'{}' is not finite", shown(text)));
   return value;
 }
 
 int64_t parse_integer(std::string_view text) {
   int64_t value = 0;
-  if (!read(text, value)) fail(fmt::format("'{}' is not an integer", shown(text)));
+  const std::errc error = read(text, value);
+  if (error == std::errc::result_out_of_range)
+    fail(fmt::format("'{}' is {}", shown(text), trim(text).starts_with('-') ? "too far below zero" : "too large"));
+  if (error != std::errc()) fail(fmt::format("'{}' is not an integer", shown(text)));
   return value;
 }
 
@@ -132,6 +143,12 @@ SampledSpectrum make_spectrum(const std::vector<double>& wavelengths, const std:
   return spectrum;
 }
 
+std::optional<ColourValue> parse_spectrum_triple(std::string_view text) {
+  const std::vector<std::string_view> tokens = split_list(text);
+  if (tokens.size() != 3 || text.find(':') != std::string_view::npos) return std::nullopt;
+  return parse_rgb(text);
+}
+
 SampledSpectrum parse_spectrum(std::string_view text) {
   const std::vector<std::string_view> tokens = split_list(text);
   if (tokens.size() == 1 && tokens[0].find(':') == std::string_view::npos)
@@ -158,8 +175,8 @@ SampledSpectrum parse_spectrum_file(std::string_view text) {
     const std::vector<std::string_view> tokens = split_list(content);
     if (tokens.empty()) continue;
     double wavelength = 0, value = 0;
-    if (tokens.size() != 2 || !read(tokens[0], wavelength) || !read(tokens[1], value) || !std::isfinite(wavelength) ||
-        !std::isfinite(value))
+    if (tokens.size() != 2 || read(tokens[0], wavelength) != std::errc() || read(tokens[1], value) != std::errc() ||
+        !std::isfinite(wavelength) || !std::isfinite(value))
       fail(fmt::format("line {} is '{}'; expected a wavelength and a value", line, shown(trim(content))));
     wavelengths.push_back(wavelength), values.push_back(value);
   }

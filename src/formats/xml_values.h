@@ -28,6 +28,10 @@ ColourValue parse_rgb(std::string_view text);
 /// The same, but numbers are sRGB-encoded too.
 ColourValue parse_srgb(std::string_view text);
 
+/// Three numbers without wavelengths: in Mitsuba 0.x, which by default renders with three components, a spectrum of
+/// linear R, G and B. Nothing if the text is something else.
+std::optional<ColourValue> parse_spectrum_triple(std::string_view text);
+
 /// "0.5" (constant), or at least two "wavelength:value" pairs with increasing wavelengths in nanometres.
 SampledSpectrum parse_spectrum(std::string_view text);
 /// Lines of "wavelength value"; "#" starts a comment. `text` is the content of an .spd file.

@@ -25,7 +25,7 @@ TEST(XmlValues, RejectsWhatIsNotANumber) {
   EXPECT_EQ(message_of([] { parse_number("nan"); }), "'nan' is not finite");
   EXPECT_EQ(message_of([] { parse_number("inf"); }), "'inf' is not finite");
   EXPECT_EQ(message_of([] { parse_integer("1.5"); }), "'1.5' is not an integer");
-  EXPECT_EQ(message_of([] { parse_integer("99999999999999999999"); }), "'99999999999999999999' is not an integer");
+  EXPECT_EQ(message_of([] { parse_integer("99999999999999999999"); }), "'99999999999999999999' is too large");
   EXPECT_EQ(message_of([] { parse_boolean("yes"); }), "'yes' is not a boolean; expected 'true' or 'false'");
   EXPECT_EQ(message_of([] { parse_numbers("1 2", 3); }), "'1 2' has 2 values; expected 3");
   EXPECT_EQ(message_of([] { parse_number(std::string(100, 'a')); }),

@@ -58,9 +58,11 @@ void warn_of_own_plugins(const ObjectDescription& scene, std::vector<std::string
     if (!child || !*child) return;
     const ObjectDescription& object = **child;
     static const std::set<std::pair<std::string, std::string>> kOwn = {
-        {"texture", "bilerp"},         {"texture", "dots"},       {"texture", "mix"},     {"texture", "noise"},
-        {"texture", "scale"},          {"texture", "projected"},  {"integrator", "bdpt"}, {"bsdf", "difftrans"},
-        {"bsdf", "metallicroughness"}, {"emitter", "goniometric"}};
+        {"texture", "bilerp"},      {"texture", "dots"},   {"texture", "mix"},
+        {"texture", "noise"},       {"texture", "scale"},  {"texture", "projected"},
+        {"integrator", "bdpt"},     {"bsdf", "difftrans"}, {"bsdf", "metallicroughness"},
+        {"emitter", "goniometric"}, {"bsdf", "coating"},   {"bsdf", "phong"},
+        {"bsdf", "roughcoating"},   {"bsdf", "ward"}};
     const bool own = kOwn.contains({object.kind, object.type});
     if (const std::string name = own_parameter(object); !name.empty() && told.insert(name).second)
       warnings.push_back(fmt::format("{}: the {} '{}' gets the parameter '{}', which Mitsuba 3 does not have",

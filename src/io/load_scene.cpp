@@ -28,8 +28,7 @@ namespace {
 
 class Loader {
  public:
-  Loader(const LoadOptions& options, LoadedScene& result)
-      : options_(options), result_(result), factory_(made_, files_, diagnostics_), jobs_(made_, files_) {}
+  Loader(const LoadOptions& options, LoadedScene& result) : options_(options), result_(result) {}
 
   void load(std::string_view text, const std::string& name) {
     const Stopwatch watch;
@@ -59,7 +58,7 @@ class Loader {
     for (const Property& property : xml_.scene->properties) {
       const ObjectPtr* pointer = std::get_if<ObjectPtr>(&property.value);
       if (!pointer) {
-        diagnostics_.error(property.where, fmt::format("<scene> has no parameter '{}'", property.name));
+        diagnostics_.unknown(property.where, fmt::format("parameter '{}' of <scene>", property.name), "");
       } else if (*pointer && placed_.insert(pointer->get()).second) {
         place(*pointer);
       }
@@ -134,7 +133,7 @@ class Loader {
       factory_.make(object);
       if (!held_.contains(object.get())) warn_unused(*object);
     } else {
-      diagnostics_.error(object->where, fmt::format("<{}> cannot stand inside <scene>", kind));
+      diagnostics_.unknown(object->where, fmt::format("part <{}> of <scene>", kind), "");
     }
   }
 
@@ -152,7 +151,7 @@ class Loader {
     for (const std::string& name : wanted_attributes(*job.description))
       if (!job.shape->has_attribute(name))
         p.warn(fmt::format("has no attribute '{}' for a texture 'mesh_attribute', which is white there", name));
-    if (!emitters.empty() && !job.shape->can_emit()) p.error("cannot emit light");
+    if (!emitters.empty()) require_emission(p, *job.shape);
     job.shape->set_bsdf(bsdfs.empty() ? default_bsdf(!emitters.empty()) : bsdfs[0]);
     use_media(media, p, *job.shape, bsdfs.empty(), parts_);
     if (!emitters.empty()) {
@@ -358,12 +357,12 @@ class Loader {
 
   const LoadOptions& options_;
   LoadedScene& result_;
-  Diagnostics diagnostics_;
+  Diagnostics diagnostics_{options_.ignore_unknown};
   FileResolver files_;
   MadeObjects made_;
-  SceneFactory factory_;
+  SceneFactory factory_{made_, files_, diagnostics_};
   SceneXml xml_;
-  SceneJobs jobs_;
+  SceneJobs jobs_{made_, files_, options_.ignore_unknown};
   std::unordered_set<const ObjectDescription*> placed_;
   std::unordered_set<const ObjectDescription*> held_;  // by objects other than the scene
   SceneParts parts_;

@@ -16,6 +16,7 @@ namespace covary {
 
 struct LoadOptions {
   std::map<std::string, std::string> defines;  ///< -D name=value, overriding <default>
+  bool ignore_unknown = false;                 ///< unknown plugins and parameters are warnings, see Diagnostics
   int width = 0, height = 0;                   ///< override the film size when > 0 (the crop is then dropped)
   SceneView view;                              ///< camera and surroundings; default: as in the file
   /// Creates the integrator from the scene's <integrator> element, so that its errors are reported with all others. If

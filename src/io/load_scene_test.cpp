@@ -123,7 +123,7 @@ TEST_F(LoadScene, ReportsWrongSensors) {
       errors(R"(<sensor type="thinlens"><float name="fov" value="180"/>
 <float name="near_clip" value="2"/><float name="far_clip" value="1"/>
 <film type="hdrfilm"><integer name="width" value="0"/><integer name="crop_width" value="1000"/>
-<string name="file_format" value="png"/><rfilter type="lanczos"/></film>
+<string name="file_format" value="png"/><rfilter type="lanczo"/></film>
 <film type="hdrfilm"/><sampler type="sobl"/></sensor>)"),
       "scene.xml:2:1: sensor 'thinlens': has 2 films; expected one\n"
       "scene.xml:2:1: sensor 'thinlens': near_clip is 2 and far_clip 1; expected 0 < near_clip < far_clip\n"
@@ -131,9 +131,10 @@ TEST_F(LoadScene, ReportsWrongSensors) {
       "scene.xml:2:25: parameter 'fov' of sensor 'thinlens' is 180; it must lie in (0, 180)\n"
       "scene.xml:4:1: film 'hdrfilm': the crop window of 1000 x 576 pixels at (0, 0) leaves the film of 768 x 576\n"
       "scene.xml:4:22: parameter 'width' of film 'hdrfilm' is 0; it must lie in [1, 65536]\n"
-      "scene.xml:5:1: parameter 'file_format' of film 'hdrfilm' is 'png'; expected one of 'openexr', 'exr'\n"
-      "scene.xml:5:41: rfilter 'lanczos' is not supported: it has negative parts, from which no position can be drawn; "
-      "use 'gaussian'. Supported: 'box', 'gaussian', 'tent'\n"
+      "scene.xml:5:1: parameter 'file_format' of film 'hdrfilm' is 'png'; expected one of 'openexr', 'exr', 'rgbe', "
+      "'hdr', 'pfm'\n"
+      "scene.xml:5:41: unknown rfilter 'lanczo'; did you mean 'lanczos'? Supported: 'box', 'catmullrom', 'gaussian', "
+      "'lanczos', 'mitchell', 'tent'\n"
       "scene.xml:6:23: unknown sampler 'sobl'; did you mean 'sobol'? Supported: 'halton', 'hammersley', 'independent', "
       "'ldsampler', 'multijitter', 'orthogonal', 'sobol', 'stratified'");
   EXPECT_EQ(errors("<shape type=\"cube\"/>"), "scene.xml:1:1: the scene has no sensor");

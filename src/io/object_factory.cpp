@@ -10,6 +10,7 @@
 
 #include "bsdfs/registry.h"
 #include "emitters/registry.h"
+#include "formats/spectrum_objects.h"
 #include "io/sensor.h"
 #include "media/registry.h"
 #include "textures/registry.h"
@@ -23,7 +24,8 @@ std::span<const Plugin<SceneObject>> setting_plugins(const std::string& kind) {
   static constexpr auto kFilm = [](Parameters& p) -> std::shared_ptr<SceneObject> { return make_film(p); };
   static constexpr auto kSampler = [](Parameters& p) -> std::shared_ptr<SceneObject> { return make_sampler(p); };
   static constexpr auto kSensor = [](Parameters& p) -> std::shared_ptr<SceneObject> { return make_sensor(p); };
-  static const Plugin<SceneObject> kFilters[] = {{"box", kFilter}, {"gaussian", kFilter}, {"tent", kFilter}};
+  static const Plugin<SceneObject> kFilters[] = {{"box", kFilter},     {"catmullrom", kFilter}, {"gaussian", kFilter},
+                                                 {"lanczos", kFilter}, {"mitchell", kFilter},   {"tent", kFilter}};
   static const Plugin<SceneObject> kFilms[] = {{"hdrfilm", kFilm}};
   static const Plugin<SceneObject> kSamplers[] = {
       {"independent", kSampler}, {"halton", kSampler},     {"hammersley", kSampler}, {"ldsampler", kSampler},
@@ -37,12 +39,26 @@ std::span<const Plugin<SceneObject>> setting_plugins(const std::string& kind) {
   return {};
 }
 
+/// The type that takes the place of an unknown one if unknown ones are ignored; "": none, the object is left out.
+const char* instead_of_unknown(std::string_view kind) {
+  for (const auto& [of, type] :
+       {std::pair("bsdf", "diffuse"), std::pair("film", "hdrfilm"), std::pair("phase", "isotropic"),
+        std::pair("rfilter", "gaussian"), std::pair("sampler", "independent"), std::pair("sensor", "perspective")})
+    if (kind == of) return type;
+  return "";
+}
+
+/// Sensors that measure something else than a picture.
+bool makes_no_picture(const ObjectDescription& description) {
+  return description.kind == "sensor" && (description.type == "distant" || description.type == "irradiancemeter" ||
+                                          description.type == "radiancemeter" || description.type == "batch");
+}
+
 /// What to use instead of Mitsuba plugins that are not supported.
 std::string advice(const ObjectDescription& description) {
   struct Advice {
     const char *kind, *type, *text;
   };
-  static constexpr const char* kNegative = "it has negative parts, from which no position can be drawn; use 'gaussian'";
   static constexpr const char* kNoPicture = "it makes no picture; use 'perspective'";
   static constexpr const char* kSplats = "its integrator is not supported either";
   static constexpr Advice kAll[] = {
@@ -52,9 +68,6 @@ std::string advice(const ObjectDescription& description) {
       {"sensor", "irradiancemeter", kNoPicture},
       {"sensor", "radiancemeter", kNoPicture},
       {"film", "specfilm", "rendering is in RGB; use 'hdrfilm'"},
-      {"rfilter", "catmullrom", kNegative},
-      {"rfilter", "lanczos", kNegative},
-      {"rfilter", "mitchell", kNegative},
       {"bsdf", "measured_polarized", "light is not polarised here; use 'measured' with the material's _rgb.bsdf"},
       {"emitter", "timed_sunsky", "nothing moves; use 'sunsky' with one of its times"},
       {"emitter", "directionalarea", "use 'directional'"},
@@ -87,14 +100,16 @@ void report_unknown_type(const ObjectDescription& description, std::vector<std::
   std::sort(supported.begin(), supported.end());
   std::string list;
   for (const std::string& name : supported) list += (list.empty() ? "'" : ", '") + name + "'";
-  if (const std::string instead = advice(description); !instead.empty()) {
-    diagnostics.error(description.where, fmt::format("{} '{}' is not supported: {}. Supported: {}", description.kind,
-                                                     description.type, instead, list));
+  const std::string name = fmt::format("{} '{}'", description.kind, description.type);
+  if (const std::string other = advice(description);
+      !other.empty() && (!diagnostics.ignores_unknown() || makes_no_picture(description))) {
+    diagnostics.error(description.where, fmt::format("{} is not supported: {}. Supported: {}", name, other, list));
     return;
   }
   const std::string hint = did_you_mean(description.type, supported);
-  diagnostics.error(description.where, fmt::format("unknown {} '{}'{} Supported: {}", description.kind,
-                                                   description.type, hint.empty() ? "." : hint, list));
+  const char* const type = instead_of_unknown(description.kind);
+  diagnostics.unknown(description.where, name, fmt::format("{} Supported: {}", hint.empty() ? "." : hint, list),
+                      *type ? fmt::format("becomes '{}'", type) : "is left out");
 }
 
 std::shared_ptr<const SceneObject> SceneFactory::make(const ObjectPtr& description) {
@@ -106,16 +121,18 @@ std::shared_ptr<const SceneObject> SceneFactory::make(const ObjectPtr& descripti
 }
 
 std::shared_ptr<const SceneObject> SceneFactory::create(const ObjectDescription& description) {
-  const auto through = [&](auto plugins) -> std::shared_ptr<const SceneObject> {
-    const auto* plugin = find_plugin(plugins, description, diagnostics_);
-    if (!plugin) return nullptr;
+  const auto through = [&](auto plugins, auto... extra) -> std::shared_ptr<const SceneObject> {
+    const auto* plugin = find_plugin(plugins, description, diagnostics_, extra...);
+    if (!plugin) return create_instead(description);
     Parameters parameters(description, *this, diagnostics_);
+    // How often a light is sampled: its picture does not depend on it.
+    if (description.kind == "emitter") parameters.get_float("sampling_weight", 1, 0);
     const auto made = make_checked(parameters, plugin->make);
     if constexpr (requires { made->set_group(description.id); })
       if (made) made->set_group(description.id);
     return made;
   };
-  if (description.kind == "texture") return through(texture_plugins());
+  if (description.kind == "texture") return through(texture_plugins(), spectrum_types());
   if (description.kind == "bsdf") return through(bsdf_plugins());
   if (description.kind == "emitter") return through(emitter_plugins());
   if (description.kind == "medium") return through(medium_plugins());
@@ -125,6 +142,16 @@ std::shared_ptr<const SceneObject> SceneFactory::create(const ObjectDescription&
   if (!settings.empty()) return through(settings);
   diagnostics_.error(description.where, fmt::format("<{}> is not supported here", description.kind));
   return nullptr;
+}
+
+std::shared_ptr<const SceneObject> SceneFactory::create_instead(const ObjectDescription& unknown) {
+  const char* const type = instead_of_unknown(unknown.kind);
+  if (!diagnostics_.ignores_unknown() || !*type || makes_no_picture(unknown)) return nullptr;
+  ObjectDescription known = unknown;
+  known.type = type;
+  // Parameters of an unknown material mean something else: it is the default of the known one.
+  if (known.kind == "bsdf" || known.kind == "phase") known.properties.clear();
+  return create(known);
 }
 
 std::optional<std::string> SceneFactory::resolve_file(const std::string& name, const SourceLocation& where) {

@@ -39,6 +39,8 @@ class SceneFactory final : public ObjectFactory {
 
  private:
   std::shared_ptr<const SceneObject> create(const ObjectDescription& description);
+  /// What takes the place of an object of unknown type where those are ignored, otherwise null.
+  std::shared_ptr<const SceneObject> create_instead(const ObjectDescription& unknown);
 
   MadeObjects& made_;
   FileResolver& files_;

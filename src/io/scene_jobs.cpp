@@ -60,7 +60,7 @@ void SceneJobs::collect_leaves(const ObjectPtr& object, std::unordered_set<const
   if ((object->kind == "texture" || object->kind == "emitter") && is_leaf(*object)) {
     LeafJob*& same = leaves_by_key_[description_key(*object)];
     if (!same || object->kind != "texture") {
-      leaves_.push_back(std::make_unique<LeafJob>());
+      leaves_.push_back(std::make_unique<LeafJob>(ignores_unknown_));
       same = leaves_.back().get();
     }
     same->descriptions.push_back(object);
@@ -72,7 +72,8 @@ void SceneJobs::collect_leaves(const ObjectPtr& object, std::unordered_set<const
 void SceneJobs::add_shape(const ObjectPtr& object, bool in_group) {
   if (object->kind != "shape" || shapes_by_description_.contains(object.get())) return;
   KeyedTransformPtr to_world;
-  shapes_.push_back(std::make_unique<ShapeJob>(in_group ? object : in_own_space(object, to_world), made_, files_));
+  shapes_.push_back(
+      std::make_unique<ShapeJob>(in_group ? object : in_own_space(object, to_world), made_, files_, ignores_unknown_));
   shapes_.back()->in_group = in_group;
   shapes_.back()->to_world = to_world;
   shapes_by_description_[object.get()] = shapes_.back().get();

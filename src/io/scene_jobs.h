@@ -20,8 +20,9 @@ namespace covary {
 
 /// A shape under construction: its surface in parallel, then material and light.
 struct ShapeJob {
-  ShapeJob(ObjectPtr object, MadeObjects& made, FileResolver& files)
+  ShapeJob(ObjectPtr object, MadeObjects& made, FileResolver& files, bool ignores_unknown)
       : description(std::move(object)),
+        diagnostics(ignores_unknown),
         factory(made, files, diagnostics),
         parameters(*description, factory, diagnostics) {}
   ShapeJob(const ShapeJob&) = delete;
@@ -40,7 +41,9 @@ struct ShapeJob {
 
 class SceneJobs {
  public:
-  SceneJobs(MadeObjects& made, FileResolver& files) : made_(made), files_(files) {}
+  /// `ignores_unknown`: of their diagnostics.
+  SceneJobs(MadeObjects& made, FileResolver& files, bool ignores_unknown)
+      : made_(made), files_(files), ignores_unknown_(ignores_unknown) {}
 
   /// Collects the jobs of a scene. Equal textures are created once.
   void collect(const ObjectDescription& scene);
@@ -59,6 +62,7 @@ class SceneJobs {
 
  private:
   struct LeafJob {
+    explicit LeafJob(bool ignores_unknown) : diagnostics(ignores_unknown) {}
     std::vector<ObjectPtr> descriptions;  // with equal content
     Diagnostics diagnostics;
   };
@@ -67,6 +71,7 @@ class SceneJobs {
 
   MadeObjects& made_;
   FileResolver& files_;
+  bool ignores_unknown_;
   std::vector<std::unique_ptr<LeafJob>> leaves_;
   std::unordered_map<std::string, LeafJob*> leaves_by_key_;
   std::vector<std::unique_ptr<ShapeJob>> shapes_;

@@ -15,6 +15,9 @@ constexpr float kHuge = std::numeric_limits<float>::max();
 constexpr int kMaxSize = 1 << 16;  // pixels along one axis
 constexpr int kMaxInt = std::numeric_limits<int>::max();
 
+const std::vector<std::string> kPixelFormats = {"rgb",  "rgba",     "luminance",      "luminance_alpha", "xyz",
+                                                "xyza", "spectrum", "spectrum_alpha", "multichannel"};
+
 /// The only child of its kind, or null.
 template <typename T>
 std::shared_ptr<const T> only_child(Parameters& p, const std::string& kind) {
@@ -32,6 +35,13 @@ std::shared_ptr<FilterObject> make_filter(Parameters& p) {
     settings = {FilterKind::kBox, 0.5f, 0.5f};
   } else if (p.type() == "tent") {
     settings = {FilterKind::kTent, p.get_float("radius", 1, 0, 100), 0.5f};
+  } else if (p.type() == "mitchell") {  // Mitsuba's A and B are B and C of the paper
+    constexpr float kThird = 1.0f / 3;
+    settings = lobed(LobedFilter::mitchell(p.get_float("A", kThird, -10, 10), p.get_float("B", kThird, -10, 10)));
+  } else if (p.type() == "catmullrom") {
+    settings = lobed(LobedFilter::catmull_rom());
+  } else if (p.type() == "lanczos") {
+    settings = lobed(LobedFilter::lanczos(p.get_int("lobes", 3, 1, 32)));
   } else {
     settings.kind = FilterKind::kGaussian;
     settings.stddev = p.get_float("stddev", 0.5f, 0, 25);
@@ -53,10 +63,14 @@ std::shared_ptr<FilmSettings> make_film(Parameters& p) {
   if (film->crop_x + film->crop_width > film->width || film->crop_y + film->crop_height > film->height)
     p.error(fmt::format("the crop window of {} x {} pixels at ({}, {}) leaves the film of {} x {}", film->crop_width,
                         film->crop_height, film->crop_x, film->crop_y, film->width, film->height));
-  // The command line determines the output file; these are accepted if they ask for what is written anyway.
-  p.get_choice("file_format", "openexr", {"openexr", "exr"});
-  if (p.get_choice("pixel_format", "rgb", {"rgb", "rgba"}) == "rgba") p.warn("no alpha channel is written");
-  p.get_choice("component_format", "float32", {"float16", "float32"});
+  // The command line determines the output file.
+  p.get_choice("file_format", "openexr", {"openexr", "exr", "rgbe", "hdr", "pfm"});
+  const std::string pixels = p.get_choice("pixel_format", "rgb", kPixelFormats);
+  if (pixels == "rgba")
+    p.warn("no alpha channel is written");
+  else if (pixels != "rgb")
+    p.warn(fmt::format("the image is RGB, not '{}'", pixels));
+  p.get_choice("component_format", "float32", {"float16", "float32", "uint32"});
   for (const char* ignored : {"banner", "high_quality_edges", "sample_border", "compensate"})
     p.get_bool(ignored, false);
   if (p.has("response")) {

@@ -296,4 +296,17 @@ std::shared_ptr<CurveShape> read_curves(std::string_view text, CurveKind kind, c
   return std::make_shared<CurveShape>(kind, std::move(reader.points), std::move(reader.segments));
 }
 
+void require_emission(Parameters& parameters, const Shape& shape) {
+  if (!shape.can_emit()) return parameters.error("cannot emit light");
+  const auto* mesh = dynamic_cast<const TriangleMesh*>(&shape);
+  if (!mesh) return;
+  if (mesh->triangles().empty()) parameters.error("cannot emit light: its mesh has no triangle of positive area");
+  for (const auto& t : mesh->triangles()) {
+    const Vec3 &a = mesh->vertices()[t[0]].p, &b = mesh->vertices()[t[1]].p, &c = mesh->vertices()[t[2]].p;
+    if (!std::isfinite(length(cross(b - a, c - a))))
+      return parameters.error(fmt::format(
+          "cannot emit light: a triangle at ({}, {}, {}) is too large for its area to be a float", a.x, a.y, a.z));
+  }
+}
+
 }  // namespace covary

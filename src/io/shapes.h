@@ -37,4 +37,7 @@ ObjectPtr in_own_space(const ObjectPtr& shape, KeyedTransformPtr& to_world);
 /// by `to_world`, radii are not. Throws Error(kInput) naming the line.
 std::shared_ptr<CurveShape> read_curves(std::string_view text, CurveKind kind, const Transform& to_world);
 
+/// Records an error if the shape cannot be a light.
+void require_emission(Parameters& parameters, const Shape& shape);
+
 }  // namespace covary

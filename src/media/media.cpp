@@ -5,6 +5,7 @@
 // |----------------|---------------|---------|--------------------------------------------------------------------|
 // | sigma_t        | colour/volume | 1       | extinction per unit of length; `homogeneous`: constant             |
 // | albedo         | colour/volume | 0.75    | fraction of it that is scattering, in [0, 1]                       |
+// | sigma_a, sigma_s | colour      |         | absorption and scattering, instead of sigma_t and albedo           |
 // | scale          | float         | 1       | factor on sigma_t                                                  |
 // | sample_emitters | boolean      | true    | whether points in the medium sample lights                         |
 // | has_spectral_extinction | boolean |       | accepted, no effect                                                |
@@ -53,11 +54,28 @@ VolumePtr volume(Parameters& p, const std::string& name, float fallback, Spectru
   return std::make_shared<ConstantVolume>(p.get_spectrum(name, Spectrum(fallback), role));
 }
 
+/// sigma_t and albedo, or the constant sigma_a and sigma_s of Mitsuba 0.x, which determine them.
+void read_coefficients(Parameters& p, MediumSettings& settings) {
+  if (!p.has("sigma_a") && !p.has("sigma_s")) {
+    settings.extinction = volume(p, "sigma_t", 1, SpectrumRole::kIndex);
+    settings.albedo = volume(p, "albedo", 0.75f, SpectrumRole::kReflectance);
+    return;
+  }
+  for (const char* other : {"sigma_t", "albedo"})
+    if (p.has(other)) p.error_at(other, "is given together with 'sigma_a' or 'sigma_s'; expected one or the other");
+  const Spectrum absorbed = p.get_spectrum("sigma_a", Spectrum(0), SpectrumRole::kIndex);
+  const Spectrum scattered = p.get_spectrum("sigma_s", Spectrum(0), SpectrumRole::kIndex);
+  const Spectrum extinction = absorbed + scattered;
+  Spectrum albedo;
+  for (int c = 0; c < 3; ++c) albedo[c] = extinction[c] > 0 ? scattered[c] / extinction[c] : 0;
+  settings.extinction = std::make_shared<ConstantVolume>(extinction);
+  settings.albedo = std::make_shared<ConstantVolume>(albedo);
+}
+
 std::shared_ptr<Medium> make_medium(Parameters& p, bool homogeneous) {
   MediumSettings settings;
   settings.homogeneous = homogeneous;
-  settings.extinction = volume(p, "sigma_t", 1, SpectrumRole::kIndex);
-  settings.albedo = volume(p, "albedo", 0.75f, SpectrumRole::kReflectance);
+  read_coefficients(p, settings);
   settings.scale = p.get_float("scale", 1, 0);
   settings.sample_lights = p.get_bool("sample_emitters", true);
   p.get_bool("has_spectral_extinction", true);

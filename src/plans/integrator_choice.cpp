@@ -20,6 +20,14 @@ void check_options(const std::string& integrator, const OptionValues& options) {
     if (!find_option(own, name)) refuse_option("integrator", integrator, own, name, integrators_with_option(name));
 }
 
+/// Marks the properties of an integrator that another one replaces as known: its own or, if it is unknown, all.
+void ignore_properties_of(const std::string& integrator, Parameters& parameters) {
+  if (find_integrator(integrator))
+    ignore_properties(parameters, options_of_integrator(integrator));
+  else
+    parameters.ignore_rest();
+}
+
 /// Mitsuba also accepts depths without any paths. Such images are black, which is rarely intended.
 void warn_of_black(Parameters& parameters, const Settings& settings) {
   const auto depth = [&](const char* name) { return std::stoi(find_option(settings.options(), name)->default_value); };
@@ -42,12 +50,17 @@ std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const 
     const std::string& of_scene = parameters.type();
     const std::string& name = choice.name.empty() ? of_scene : choice.name;
     const IntegratorPlugin* plugin = find_integrator(name);
+    if (!plugin && parameters.ignores_unknown()) {
+      parameters.unknown(fmt::format("integrator '{}'", name), "", "becomes 'path'");
+      plugin = find_integrator("path");
+    }
     if (!plugin) {
-      parameters.error(unknown_integrator(name));
+      parameters.error(
+          fmt::format("{}; --integrator path renders the scene by path tracing", unknown_integrator(name)));
       return nullptr;
     }
-    check_options(name, choice.options);
-    if (name != of_scene && find_integrator(of_scene)) ignore_properties(parameters, options_of_integrator(of_scene));
+    check_options(plugin->name, choice.options);
+    if (plugin->name != of_scene) ignore_properties_of(of_scene, parameters);
     PropertySource source(parameters, choice.options);
     Settings settings(source);
     auto integrator = make_integrator(*plugin, settings);

@@ -30,9 +30,37 @@ void Diagnostics::warn(const SourceLocation& where, const std::string& message) 
   warnings_.push_back(where.file.empty() ? message : where.text() + ": " + message);
 }
 
+namespace {
+
+auto place(const SourceLocation& where) { return std::tie(where.file, where.line, where.column); }
+
+}  // namespace
+
+void Diagnostics::unknown(const SourceLocation& where, const std::string& what, const std::string& hint,
+                          const std::string& instead) {
+  if (!ignores_unknown_) return error(where, "unknown " + what + hint);
+  Ignored& entry = ignored_[fmt::format("unknown {} {}", what, instead)];
+  if (entry.n++ == 0 || place(where) < place(entry.first)) entry.first = where;
+}
+
 void Diagnostics::append(const Diagnostics& other) {
   errors_.insert(errors_.end(), other.errors_.begin(), other.errors_.end());
   warnings_.insert(warnings_.end(), other.warnings_.begin(), other.warnings_.end());
+  for (const auto& [message, entry] : other.ignored_) {
+    Ignored& own = ignored_[message];
+    if (own.n == 0 || place(entry.first) < place(own.first)) own.first = entry.first;
+    own.n += entry.n;
+  }
+}
+
+std::vector<std::string> Diagnostics::warnings() const {
+  std::vector<std::pair<std::string, Ignored>> ignored(ignored_.begin(), ignored_.end());
+  std::stable_sort(ignored.begin(), ignored.end(),
+                   [](const auto& a, const auto& b) { return place(a.second.first) < place(b.second.first); });
+  std::vector<std::string> texts = warnings_;
+  for (const auto& [message, entry] : ignored)
+    texts.push_back(entry.first.text() + ": " + message + (entry.n > 1 ? fmt::format(" ({} times)", entry.n) : ""));
+  return texts;
 }
 
 void Diagnostics::throw_if_errors() const {
@@ -128,6 +156,10 @@ void Parameters::error_at(const std::string& parameter, const std::string& messa
                      fmt::format("parameter '{}' of {} {}", parameter, subject(object_), message));
 }
 
+void Parameters::unknown(const std::string& what, const std::string& hint, const std::string& instead) {
+  diagnostics_.unknown(object_.where, what, hint, instead);
+}
+
 void Parameters::warn(const std::string& message) {
   diagnostics_.warn(object_.where, subject(object_) + ": " + message);
 }
@@ -149,7 +181,10 @@ int Parameters::get_int(const std::string& name, int fallback, int lowest, int h
     return fallback;
   }
   if (*value < lowest || *value > highest) {
-    error_at(name, fmt::format("is {}; it must {}", *value, range_text(lowest, highest)));
+    // Without a bound of its own, a parameter is bounded by its type, which is worth a word only beyond it.
+    error_at(name, *value > std::numeric_limits<int>::max()
+                       ? fmt::format("is {}; it must be at most {}", *value, highest)
+                       : fmt::format("is {}; it must {}", *value, range_text(lowest, highest)));
     return fallback;
   }
   return static_cast<int>(*value);
@@ -161,6 +196,10 @@ float Parameters::get_float(const std::string& name, float fallback, float lowes
   float value = 0;
   if (const double* number = std::get_if<double>(&property->value)) {
     value = static_cast<float>(*number);
+    if (std::isinf(value)) {
+      error_at(name, fmt::format("is {:g}, which is too large for a float", *number));
+      return fallback;
+    }
   } else if (const int64_t* integer = std::get_if<int64_t>(&property->value)) {
     value = static_cast<float>(*integer);
   } else {
@@ -233,6 +272,11 @@ Spectrum Parameters::get_spectrum(const std::string& name, const Spectrum& fallb
       return fallback;
     }
     return c;
+  }
+  if (const ObjectPtr* object = std::get_if<ObjectPtr>(&property->value); object && (*object)->kind == "texture") {
+    const auto texture = std::dynamic_pointer_cast<const Texture>(factory_.make(*object));
+    if (!texture) return fallback;  // already reported
+    if (texture->is_constant()) return texture->eval(SurfaceHit{});
   }
   error_at(name, "must be a float, rgb colour or spectrum, not " + type_name(property->value));
   return fallback;
@@ -311,13 +355,15 @@ void Parameters::report_unknown() {
     if (object && !*object) continue;  // already reported as invalid when it was read
     if (property.name.empty()) {
       const std::string nested = object ? subject(**object) : type_name(property.value);
-      diagnostics_.error(property.where, fmt::format("{} cannot hold {}", subject(object_), nested));
+      if (diagnostics_.ignores_unknown())
+        diagnostics_.unknown(property.where, fmt::format("part {} of {}", nested, subject(object_)), "");
+      else
+        diagnostics_.error(property.where, fmt::format("{} cannot hold {}", subject(object_), nested));
       continue;
     }
     std::string hint = did_you_mean(property.name, known);
     if (hint.empty()) hint = known.empty() ? "; it has no parameters" : "; known: " + quoted_list(known);
-    diagnostics_.error(property.where,
-                       fmt::format("unknown parameter '{}' of {}{}", property.name, subject(object_), hint));
+    diagnostics_.unknown(property.where, fmt::format("parameter '{}' of {}", property.name, subject(object_)), hint);
   }
 }
 

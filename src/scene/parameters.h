@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,7 +32,15 @@ struct SourceLocation {
 /// Collects all problems of a scene so that they can be reported at once.
 class Diagnostics {
  public:
+  /// `ignores_unknown`: what unknown() gets are warnings instead of errors.
+  explicit Diagnostics(bool ignores_unknown = false) : ignores_unknown_(ignores_unknown) {}
+  bool ignores_unknown() const { return ignores_unknown_; }
+
   void error(const SourceLocation& where, const std::string& message);
+  /// Something that nothing here knows: `what`, e.g. "parameter 'x' of bsdf 'y'", as an error "unknown WHAT" followed
+  /// by `hint`, or as a warning that names the first place and the number of places. `instead` ends the warning.
+  void unknown(const SourceLocation& where, const std::string& what, const std::string& hint,
+               const std::string& instead = "is ignored");
   /// Harmless problem; callers should count repeated messages of one kind and report them once.
   void warn(const SourceLocation& where, const std::string& message);
   /// Takes over all entries of `other`; for objects constructed in parallel.
@@ -40,15 +49,22 @@ class Diagnostics {
   /// Throws Error(kInput) with all errors, sorted by file and line, one per line as "file:line:column: message"; after
   /// 100 errors, the number of remaining ones.
   void throw_if_errors() const;
-  const std::vector<std::string>& warnings() const { return warnings_; }
+  /// Warnings in the order of their recording, then what was unknown, by place.
+  std::vector<std::string> warnings() const;
 
  private:
   struct Entry {
     SourceLocation where;
     std::string message;
   };
+  struct Ignored {
+    SourceLocation first;
+    size_t n = 0;
+  };
+  bool ignores_unknown_;
   std::vector<Entry> errors_;
   std::vector<std::string> warnings_;
+  std::map<std::string, Ignored> ignored_;
 };
 
 /// A spectrum given by pairs of wavelength (nm) and value, strictly increasing in wavelength, linearly interpolated,
@@ -140,6 +156,11 @@ class Parameters {
   void error(const std::string& message);
   void error_at(const std::string& parameter, const std::string& message);
   void warn(const std::string& message);
+  /// Diagnostics::unknown() about this object.
+  void unknown(const std::string& what, const std::string& hint, const std::string& instead);
+  bool ignores_unknown() const { return diagnostics_.ignores_unknown(); }
+  /// Whatever is not queried is not reported: it belongs to a plugin that another one replaces.
+  void ignore_rest() { used_.assign(used_.size(), true); }
   /// Reports every property that was not queried. The factory calls it after constructing the plugin.
   void report_unknown();
 

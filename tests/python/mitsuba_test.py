@@ -108,6 +108,13 @@ class Render(WithMitsuba):
         spread = numpy.ptp(groups, axis=(1, 2)) / groups.mean(axis=(1, 2))
         self.assertLess(spread.max(), 0.02)
 
+    def test_scene_without_integrator(self):
+        """As load_dict() makes one: rendered by path, of the value 1 that the light has everywhere."""
+        scene = self.mi.load_dict({"type": "scene", "light": {"type": "constant"}, "camera": {
+            "type": "perspective", "film": {"type": "hdrfilm", "width": 8, "height": 6, "rfilter": {"type": "box"}}}})
+        self.assertIsNone(scene.integrator())
+        numpy.testing.assert_allclose(covary.mitsuba.render(scene, 6).image, 1, atol=1e-5)
+
     def test_other_variants(self):
         """Without colours, all channels are one; spectra become colours."""
         for variant in ("llvm_ad_mono", "llvm_ad_spectral"):
