@@ -279,8 +279,8 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
 
     scene: a mitsuba.Scene, or the name of an XML file.
     spp: samples per pixel, of both images together.
-    integrator: instead of the scene's; an Integrator, its name, or a dictionary for mitsuba.load_dict(). A scene without
-        one is rendered by "path", as Mitsuba does with files.
+    integrator: instead of the scene's; an Integrator, its name, or a dictionary for mitsuba.load_dict(). A scene
+        without one is rendered by "path", as Mitsuba does with files.
     sensor: its index in the scene.
     groups: number of groups of samples in each image; fewer if there are fewer samples.
     aovs: also render albedo and shading normals, "Albedo" and "N", and those seen in mirrors and through glass,

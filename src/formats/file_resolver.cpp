@@ -47,8 +47,8 @@ std::string lower_case(std::string text) {
   return text;
 }
 
-/// The file at `path` with letters of another case, as file systems of Windows and macOS find it; "" if there is none or
-/// more than one.
+/// The file at `path` with letters of another case, as file systems of Windows and macOS find it; "" if there is none,
+/// or more than one.
 fs::path in_other_case(const fs::path& path) {
   std::error_code ignored;
   fs::path found = path.root_path();

@@ -18,8 +18,8 @@ Vec3 to_vec3(const std::vector<double>& v) {
 /// Any direction orthogonal to `d`.
 Vec3 some_orthogonal(const Vec3& d) { return std::abs(d.x) > std::abs(d.y) ? Vec3{-d.z, 0, d.x} : Vec3{0, d.z, -d.y}; }
 
-/// A scale that flattens one axis, which exporters write for planes, leaves a thickness far below the rounding errors of
-/// the others instead of none, so that normals stay defined.
+/// A scale that flattens one axis, which exporters write for planes, leaves a thickness far below the rounding errors
+/// of the others instead of none, so that normals stay defined.
 Vec3 thin(Vec3 scale) {
   const int n_zero = (scale.x == 0) + (scale.y == 0) + (scale.z == 0);
   for (int i = 0; i < 3 && n_zero == 1; ++i)

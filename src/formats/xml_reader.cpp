@@ -35,8 +35,8 @@ const std::vector<std::string> kOtherTags = {"boolean", "integer", "float",    "
                                              "rgb",     "srgb",    "spectrum", "blackbody", "include",  "alias",
                                              "default", "path",    "ref",      "transform", "animation"};
 
-/// What an element of this tag and type describes: colours may be written as textures, as Mitsuba's own writer does, and
-/// textures as spectra. The first versions of Mitsuba had other names for sensors and emitters.
+/// What an element of this tag and type describes: colours may be written as textures, as Mitsuba's own writer does,
+/// and textures as spectra. The first versions of Mitsuba had other names for sensors and emitters.
 std::string kind_of(std::string_view tag, std::string_view type) {
   if (tag == "spectrum" || (tag == "texture" && type != "uniform"))
     return is_spectrum_type(type) ? "spectrum" : "texture";

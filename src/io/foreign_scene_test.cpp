@@ -354,6 +354,15 @@ TEST_F(ForeignScene, UnknownPartsOfTheCameraBecomeTheUsualOnes) {
                        "sensor 'irradiancemeter' is not supported: it makes no picture"));
 }
 
+TEST_F(ForeignScene, FormsOfForksBecomeGrey) {
+  const LoadedScene scene = load(
+      "<shape type=\"rectangle\"><bsdf type=\"normalmap\"><string name=\"filename\" value=\"n.exr\"/><bsdf "
+      "type=\"conductor\"/></bsdf></shape>",
+      ignoring());
+  EXPECT_TRUE(contains(warnings(scene), "scene.xml:3:25: unknown form of bsdf 'normalmap' becomes 'diffuse'"));
+  expect_colour(scattered(scene, {0, 0, 1}, {0, 0.6f, 0.8f}), Spectrum(0.5f * 0.8f / kPi));
+}
+
 TEST_F(ForeignScene, WrongValuesStayErrors) {
   EXPECT_TRUE(contains(
       message_of([&] { load("<shape type=\"sphere\"><string name=\"radius\" value=\"x\"/></shape>", ignoring()); }),

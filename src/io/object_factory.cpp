@@ -124,10 +124,18 @@ std::shared_ptr<const SceneObject> SceneFactory::create(const ObjectDescription&
   const auto through = [&](auto plugins, auto... extra) -> std::shared_ptr<const SceneObject> {
     const auto* plugin = find_plugin(plugins, description, diagnostics_, extra...);
     if (!plugin) return create_instead(description);
-    Parameters parameters(description, *this, diagnostics_);
+    const bool replaceable = description.kind == "bsdf" && diagnostics_.ignores_unknown();
+    Diagnostics own(true);
+    Parameters parameters(description, *this, replaceable ? own : diagnostics_);
     // How often a light is sampled: its picture does not depend on it.
     if (description.kind == "emitter") parameters.get_float("sampling_weight", 1, 0);
     const auto made = make_checked(parameters, plugin->make);
+    if (replaceable && own.has_errors() && !own.warnings().empty()) {  // the parameters are those of a fork
+      diagnostics_.unknown(description.where, fmt::format("form of bsdf '{}'", description.type), "",
+                           "becomes 'diffuse'");
+      return create_instead(description);
+    }
+    if (replaceable) diagnostics_.append(own);
     if constexpr (requires { made->set_group(description.id); })
       if (made) made->set_group(description.id);
     return made;

@@ -16,8 +16,8 @@ struct SplatPixel {
 
 /// Chooses the one pixel that a splat belongs to. A pixel's mean is an integral over the film with the filter h around
 /// its centre as a density, so a splat at a film position adds h times its value to each pixel within the filter's
-/// radius. One of these is chosen with probability proportional to |h|, and gets the value times the sum of |h| over all
-/// of them, with the sign of h: one splat, one pixel, like camera samples.
+/// radius. One of these is chosen with probability proportional to |h|, and gets the value times the sum of |h| over
+/// all of them, with the sign of h: one splat, one pixel, like camera samples.
 class SplatFilter {
  public:
   explicit SplatFilter(const FilterSettings& filter);

@@ -46,8 +46,8 @@ class ForeignScenes(CliTest):
         name = self.scene("white.xml", '<emitter type="constant"/>')
         for rfilter in ("mitchell", "catmullrom", "lanczos"):
             for estimator in ("none", "iicv"):
-                image = self.render(name, "--spp", "64", "--rfilter", rfilter, "--sampler", "independent", "--estimator",
-                                    estimator)[1]
+                image = self.render(name, "--spp", "64", "--rfilter", rfilter, "--sampler", "independent",
+                                    "--estimator", estimator)[1]
                 self.assertAlmostEqual(sum(image) / len(image), 1, delta=0.03, msg=(rfilter, estimator))
                 self.assertGreater(max(image), 1.001)
 
