@@ -67,7 +67,7 @@ TEST(XmlReader, ReadsSpectrumObjects) {
   <spectrum name="f" type="d65"><float name="scale" value="2"/></spectrum>
 </emitter>)");
   EXPECT_EQ(r.errors, "no error");
-  const ObjectDescription& emitter = child(r, 1);
+  const ObjectDescription& emitter = child(r);
   EXPECT_EQ(std::get<double>(value(emitter, "a")), 0.5);
   using Samples = std::vector<std::pair<float, float>>;
   EXPECT_EQ(std::get<SampledSpectrum>(value(emitter, "b")).samples, (Samples{{400, 1}, {500, 2}}));
@@ -146,7 +146,7 @@ TEST(XmlReader, ReportsWrongTransforms) {
 <rotate x="0" angle="3"/>
 <rotate x="1"/>
 <matrix value="1 2 3"/>
-<scale x="0"/>
+<scale x="0" y="0"/>
 <scale value="1" x="2"/>
 <translat x="1"/>
 <lookat origin="0 0 0" target="0 0 0" up="0 1 0"/>

@@ -101,7 +101,7 @@ TEST_F(ParametersTest, ReportsValuesOutOfRange) {
       "scene.xml:2:5: parameter 'fov' of bsdf 'test' is 190; it must lie in [0, 180]\n"
       "scene.xml:3:5: parameter 'depth' of bsdf 'test' is -5; it must lie in [-1, 100]\n"
       "scene.xml:4:5: parameter 'colour' of bsdf 'test' is the colour (0.5, 1.5, 0); reflectances must lie in [0, 1]\n"
-      "scene.xml:5:5: parameter 'huge' of bsdf 'test' is inf; it must fit into a float\n"
+      "scene.xml:5:5: parameter 'huge' of bsdf 'test' is 1e+300, which is too large for a float\n"
       "scene.xml:6:5: parameter 'spp' of bsdf 'test' is 0; it must be at least 1");
 }
 
