@@ -275,8 +275,8 @@ TEST_F(LoadScene, ReportsEveryProblemOfShapesAtOnce) {
       "scene.xml:12:1: shape 'cube': only an emitter 'area' can be part of a shape",
       "scene.xml:13:20: shape 'cube' cannot hold medium 'homogeneous'",
       "scene.xml:14:1: emitter 'area' must stand inside the shape that emits, or have an id to which shapes refer",
-      "scene.xml:15:1: <subsurface> cannot stand inside <scene>",
-      "scene.xml:16:1: <scene> has no parameter 'gravity'",
+      "scene.xml:15:1: unknown part <subsurface> of <scene>",
+      "scene.xml:16:1: unknown parameter 'gravity' of <scene>",
   };
   size_t from = 0;  // in this order
   for (const char* message : expected) {

@@ -70,7 +70,7 @@ TEST(SceneReferences, PartsOfSensors) {
   EXPECT_TRUE(contains(warnings(load(kSensor + "<shape type=\"sphere\"/><sampler type=\"sobol\" id=\"a\"/>")),
                        "sampler 'sobol' is not used"));
   EXPECT_TRUE(contains(errors(kSensor + "<shape type=\"sphere\"/><sampler type=\"sobol\"/>"),
-                       "<sampler> cannot stand inside <scene>"));
+                       "unknown part <sampler> of <scene>"));
 }
 
 TEST(SceneReferences, WrappedIntegratorIsRendered) {
