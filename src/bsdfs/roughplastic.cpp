@@ -13,8 +13,8 @@
 //
 // Like plastic.cpp, with the transmittance T of the rough interface in place of 1 - F:
 //     f_diffuse = T(wi) T(wo) rho / (pi eta^2 (1 - rho Ri)).
-// T(cos) and the mean internal reflectance Ri are those of rough_transmittance.h; where alpha varies, or differs along u
-// and v, of the nearest of 16 isotropic interfaces.
+// T(cos) and the mean internal reflectance Ri are those of rough_transmittance.h; where alpha varies, or differs along
+// u and v, of the nearest of 16 isotropic interfaces.
 #include "bsdfs/coated.h"
 #include "bsdfs/fresnel.h"
 #include "bsdfs/registry.h"

@@ -42,8 +42,8 @@ class FileResolver {
 /// The bytes of a file, memory-mapped for reading; those of a file named *.gz are uncompressed.
 class FileView {
  public:
-  /// Throws Error(kIo) if the file cannot be opened or is not a regular file; Error(kInput) for a pointer of Git LFS, or
-  /// if the file is compressed and damaged, or too large.
+  /// Throws Error(kIo) if the file cannot be opened or is not a regular file; Error(kInput) for a pointer of Git LFS,
+  /// or if the file is compressed and damaged, or too large.
   explicit FileView(const std::string& path);
   ~FileView();
   FileView(const FileView&) = delete;
