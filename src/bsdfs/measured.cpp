@@ -21,9 +21,9 @@
 
 #include "bsdfs/inputs.h"
 #include "bsdfs/registry.h"
-#include "bsdfs/tensor_file.h"
-#include "bsdfs/warp_table.h"
 #include "core/memory_limit.h"
+#include "tensors/tensor_file.h"
+#include "tensors/warp_table.h"
 
 namespace covary {
 namespace {

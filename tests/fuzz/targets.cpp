@@ -9,7 +9,6 @@
 #include <string>
 #include <string_view>
 
-#include "bsdfs/tensor_file.h"
 #include "combine/grouped_file.h"
 #include "core/error.h"
 #include "film/film_file.h"
@@ -21,6 +20,7 @@
 #include "sampling/coefficient_table.h"
 #include "sampling/guiding_field.h"
 #include "support/leaks.h"
+#include "tensors/tensor_file.h"
 #include "textures/image.h"
 
 namespace covary::fuzz {

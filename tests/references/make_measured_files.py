@@ -22,7 +22,7 @@ TYPES = {np.dtype(np.uint8): 1, np.dtype(np.float32): 10}
 
 
 def write_tensor_file(path, fields):
-    """The container as src/bsdfs/tensor_file.h describes it."""
+    """The container as src/tensors/tensor_file.h describes it."""
     fields = {name: np.ascontiguousarray(values) for name, values in fields.items()}
     place = 18 + sum(2 + len(name) + 11 + 8 * values.ndim for name, values in fields.items())
     head, body = b"tensor_file\0" + bytes([1, 0]) + np.uint32(len(fields)).tobytes(), b""

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tensor files for tests, as strings (format: bsdfs/tensor_file.h).
+// Tensor files for tests, as strings (format: tensors/tensor_file.h).
 #pragma once
 
 #include <cstdint>

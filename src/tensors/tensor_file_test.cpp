@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bsdfs/tensor_file.h"
+#include "tensors/tensor_file.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bsdfs/warp_table.h"
+#include "tensors/warp_table.h"
 
 #include <fmt/format.h>
 
