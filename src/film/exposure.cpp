@@ -28,7 +28,11 @@ double exposure_for_display(const Image& linear) {
     const auto burnt = std::upper_bound(logs.begin(), logs.end(), std::log2(kBurnt) - stops);
     return (black - logs.begin()) + (logs.end() - burnt);
   };
-  if (static_cast<double>(n_lost(0)) <= 0.1 * static_cast<double>(logs.size())) return 0;
+  const auto is_good = [&](double stops) {
+    return static_cast<double>(n_lost(stops)) <= 0.1 * static_cast<double>(logs.size());
+  };
+  for (int half = 0; half <= kMostHalfStops; ++half)
+    if (is_good(-half / 2.0)) return half == 0 ? 0 : -half / 2.0;
   const double key = std::log2(0.18) - sum / static_cast<double>(logs.size());
   double best = 0;
   auto fewest = n_lost(0);

@@ -26,13 +26,14 @@ TEST(Exposure, LeavesGoodPicturesAlone) {
 }
 
 TEST(Exposure, BringsEverythingIntoTheRange) {
-  // Uniform: to 0.18, in half stops. log2(0.18 / 200) = -10.12, log2(0.18 / 1e-4) = 10.81.
-  EXPECT_EQ(exposure_for_display(grey(std::vector<float>(10, 200))), -10);
+  // Bright: below 1, log2(1 / 200) = -7.64; dark: to 0.18, log2(0.18 / 1e-4) = 10.81; in half stops.
+  EXPECT_EQ(exposure_for_display(grey(std::vector<float>(10, 200))), -8);
+  EXPECT_EQ(exposure_for_display(grey({0.9f, 0.95f, 1.02f, 0.97f, 1.1f, 0.98f})), -0.5);  // noise around white
   EXPECT_EQ(exposure_for_display(grey(std::vector<float>(10, 1e-4f))), 11);
-  // From 1 to 512: in [0.0015, 1.001] for stops of -9.38 (log2(0.0015)) to -9 (log2(1 / 512)): only -9 is a half stop.
+  // From 1 to 512: with -8 stops all but 512, a tenth, are at most 1.
   std::vector<float> range;
   for (int i = 0; i < 10; ++i) range.push_back(std::exp2(static_cast<float>(i)));
-  EXPECT_EQ(exposure_for_display(grey(range)), -9);
+  EXPECT_EQ(exposure_for_display(grey(range)), -8);
   // More than the range: the few bright ones are given up.
   std::vector<float> lamps(60, 2.0f);
   lamps.resize(70, 1e6f);
@@ -44,7 +45,7 @@ TEST(Exposure, BringsEverythingIntoTheRange) {
 TEST(Exposure, NumbersThatAreNoneAreLeftOut) {
   std::vector<float> values(10, 8);
   values.push_back(NAN), values.push_back(INFINITY);
-  EXPECT_EQ(exposure_for_display(grey(values)), -5.5);  // log2(0.18 / 8) = -5.47
+  EXPECT_EQ(exposure_for_display(grey(values)), -3);  // 8 becomes 1
 }
 
 TEST(Exposure, ExposedIsAFactor) { EXPECT_EQ(exposed(grey({0.5f, 3}), -2).data[3], 0.75f); }
