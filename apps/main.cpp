@@ -13,6 +13,7 @@
 #include <iostream>
 #include <new>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "command_description.h"
@@ -127,6 +128,8 @@ int run_and_report(int argc, char** argv) {
     return report("covary", error);
   } catch (const std::bad_alloc&) {
     std::fputs("covary: out of memory\n", stderr);
+  } catch (const std::system_error& error) {  // of threads that cannot start
+    std::fprintf(stderr, "covary: the system gives no more threads or memory: %s\n", error.what());
   } catch (const std::exception& error) {
     std::fprintf(stderr, "covary: internal error: %s\n", error.what());
   }

@@ -83,12 +83,12 @@ inline void declare_goal(Settings& s, RenderRequest& r) {
   s.whole("spp", r.spp, {.low = 1, .high = kMostSamples}, "Samples per pixel over all passes; default: the scene's",
           kBasicPasses);
   s.text_as("until", r, "relmse=X", read_until,
-            "Add samples, up to `spp`, until the predicted error is X; relmse-p95=X: in 95 % of the blocks of 16 x 16 "
-            "pixels; relative=X: until 3 sigma of each pixel are that part of it (adaptive counts)",
+            "Add samples, up to `spp`, until the predicted error is X; relmse-p95=X: in 95 % of 16 x 16 blocks; "
+            "relative=X: 3 sigma of each pixel",
             kBasicPasses);
   std::optional<double> seconds;
   s.real("time", seconds, {.low = 0, .above_low = true},
-         "Seconds for everything but loading; with too few, says so and does the least", kBasicPasses);
+         "Seconds for everything but loading", kBasicPasses);
   if (seconds) r.seconds = *seconds;
 }
 

@@ -49,7 +49,8 @@ class Bdpt(CliTest):
                         ("--estimator", "iicv", "--adaptive"), ("--estimator", "dependent-tests"),
                         ("--estimator", "dependent-tests", "--paper"),
                         ("--estimator", "dependent-tests", "--until", "relative=0.1", "--max-spp", "9")):
-            self.good("render", "scene.xml", "-o", "a.exr", "--spp", "16", "--quiet", "--no-preview", *options)
+            self.good("render", "scene.xml", "-o", "a.exr", "--spp", "16", "--quiet", "--no-preview", "--environment",
+                      "none", *options)
             self.assertEqual({v for channel in self.pixels("a.exr") for v in channel}, {0.0}, options)
 
 

@@ -119,7 +119,9 @@ class Limits(unittest.TestCase):
     def test_continued_lines(self):
         self.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 \\\n2 3\n")
         self.write("s.xml", scene('<shape type="obj"><string name="filename" value="a.obj"/></shape>'))
-        self.assertEqual(self.run_limited("info", "s.xml"), (0, ""))
+        code, text = self.run_limited("info", "s.xml")
+        self.assertEqual((code, text.count("\n")), (0, 1), text)
+        self.assertIn("has no light", text)
 
     def exr(self, attributes, body=b""):
         """An EXR file of 4 x 4 pixels with these attributes besides the required ones."""

@@ -333,7 +333,7 @@ class Cluster(PackageTest):
                                    ({"settings": {"output": "x.exr"}},
                                     "settings: found 'output'; expected one of filter"),
                                    ({"settings": {"sampling": "crn"}}, "sampling: found 'crn' with estimator 'iicv'"),
-                                   ({"window": 4}, "window is 4")):
+                                   ({"window": 4}, "window '4': expected an odd whole number")):
                 self.assertIn(text, self.message_of(covary.UsageError, covary.distributed.render, self.client,
                                                     self.scene(), 24, "iicv", **keywords))
         finally:

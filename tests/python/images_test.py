@@ -89,7 +89,7 @@ class Estimators(FilesTest):
 
     def test_options_of_passes_are_refused(self):
         self.assertTrue(any(option["of_passes"] for option in covary._covary.estimators()[0]["options"]))
-        for options in ({"adaptive": True}, {"max_spp": 9}, {"pilot_spp": 9}):
+        for options in ({"adaptive": True}, {"max_spp": 9}, {"dependent_spp": 9}):
             message = self.message_of(covary.UsageError, covary.combine, self.crn, self.independent, **options)
             self.assertIn("says how many samples pixels get while they are rendered", message)
         self.assertRaises(TypeError, covary.iicv, self.crn, self.independent, adaptive=True)
