@@ -102,6 +102,10 @@ Estimator make_default_estimator(bool is_pair, const OptionValues& values, const
   return with_denoising(make_estimator(is_pair ? kIicv : kDefaultEstimator, values), choice);
 }
 
+Estimator make_default_estimator() {
+  return make_default_estimator(false, {}, {usual_denoising(kDefaultEstimator), "", {}});
+}
+
 std::vector<std::string> estimators_with_option(const std::string& option) {
   std::vector<std::string> names;
   for (const EstimatorPlugin& plugin : estimator_plugins())

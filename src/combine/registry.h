@@ -6,12 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "denoising/mixed_denoising.h"
 #include "estimators/estimator.h"
 #include "estimators/mean.h"
 #include "settings/settings.h"
 
 namespace covary {
+
+struct DenoisingChoice;
 
 struct EstimatorPlugin {
   const char* name;
@@ -59,7 +60,8 @@ Estimator with_denoising(const Estimator& base, const DenoisingChoice& choice);
 std::string usual_denoising(const std::string& estimator);
 /// What the default means for a pair of images (`is_pair`) or for independent samples alone, with its options and
 /// denoising. Throws Error(kUsage) like make_estimator() and with_denoising().
-Estimator make_default_estimator(bool is_pair = false, const OptionValues& values = {},
-                                 const DenoisingChoice& choice = {DenoisingChoice::kAuto, "", {}});
+Estimator make_default_estimator(bool is_pair, const OptionValues& values, const DenoisingChoice& choice);
+/// For independent samples, as every command does it.
+Estimator make_default_estimator();
 
 }  // namespace covary

@@ -22,6 +22,8 @@ struct Estimator;
 EstimatorResult mean_of_groups(const GroupedImage& image);
 
 inline constexpr const char* kMeanName = "none";
+/// The mean with denoised images mixed in (denoising/mixed_denoising.h): covary's default.
+inline constexpr const char* kMixture = "mixture";
 /// The estimator `none` with these options. Throws Error(kUsage) listing everything wrong with them.
 Estimator make_none(Settings& options);
 

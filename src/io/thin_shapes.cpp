@@ -48,6 +48,7 @@ std::optional<SurfacePoint> point_on(const Shape& shape, uint32_t i) {
 /// at least `most` or belongs to another shape.
 float thickness(const Scene& scene, const Shape& shape, const SurfacePoint& at, const Vec3& w, float most) {
   const float step = spacing_at(at.p);
+  if (!std::isfinite(dot(at.p, at.p)) || !(dot(w, w) > 0)) return kInfinity;  // without a normal, or too far away
   Ray ray{at.p - w * (4 * step), w, most + 8 * step};
   SurfaceHit hit;
   float first = kInfinity;

@@ -57,6 +57,7 @@ std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const 
     if (!plugin) {
       parameters.error(
           fmt::format("{}; --integrator path renders the scene by path tracing", unknown_integrator(name)));
+      parameters.ignore_rest();
       return nullptr;
     }
     check_options(plugin->name, choice.options);
