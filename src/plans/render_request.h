@@ -87,8 +87,7 @@ inline void declare_goal(Settings& s, RenderRequest& r) {
             "relative=X: 3 sigma of each pixel",
             kBasicPasses);
   std::optional<double> seconds;
-  s.real("time", seconds, {.low = 0, .above_low = true},
-         "Seconds for everything but loading", kBasicPasses);
+  s.real("time", seconds, {.low = 0, .above_low = true}, "Seconds for everything but loading", kBasicPasses);
   if (seconds) r.seconds = *seconds;
 }
 
