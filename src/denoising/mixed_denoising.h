@@ -56,7 +56,8 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
 /// Whether with_denoising() takes the estimator as base.
 bool can_be_denoised(const Estimator& estimator);
 
-/// The estimator kMixture of estimators/mean.h, before it is denoised, with these options. Throws Error(kUsage) listing everything wrong with them.
+/// The estimator kMixture of estimators/mean.h, before it is denoised, with these options. Throws Error(kUsage) listing
+/// everything wrong with them.
 Estimator make_mixture(Settings& options);
 
 /// MixedDenoisingOptions as text, as on the command line.

@@ -30,10 +30,14 @@ struct Candidate {
 };
 
 std::vector<Candidate> candidates_of(const std::vector<ExrFile::Channel>& channels) {
+  std::map<std::string, std::string> views;  // by channel: files may have many thousand layers
+  for (const ExrFile::Channel& c : channels)
+    if (!c.view.empty()) views[c.name] = c.view;
   std::vector<Candidate> all;
   for (const ColourLayer& layer : colour_layers(channels)) {
     if (!holds_colours(layer.channels)) continue;
-    Candidate c{{layer.name, view_of(layer.name, channels), layer.channels}, "", ""};
+    const auto view = views.find(layer.channels[0]);
+    Candidate c{{layer.name, view == views.end() ? "" : view->second, layer.channels}, "", ""};
     c.name = without_view(layer.name, c.picture.view);
     c.folder = folder_of(c.name);
     c.rank = c.name.empty() ? -1 : rank_as_picture(c.name);

@@ -40,7 +40,7 @@ class Numbers(CliTest):
                 for value in NO_NUMBERS:
                     with self.subTest(command=command, option=option, value=value):
                         self.bad(2, option, command, *others, f"{option}={value}")
-        self.assertGreater(n_options, 80)
+        self.assertGreater(n_options, 50)
 
 
 if __name__ == "__main__":

@@ -68,7 +68,8 @@ class Cluster(unittest.TestCase):
         self.run_in_folder(COVARY, "merge", *films, "-o", "mean.exr")
         facts = self.run_in_folder(COVARY, "compare", "out.mean.exr", "--reference", "mean.exr", "--json", "-")
         self.assertEqual(json.loads(facts.splitlines()[0])["relmse"], 0)
-        self.assertIn(f"of {TASKS} renders, guided by albedo and normal", (self.path / "out.parts/join.log").read_text())
+        log = (self.path / "out.parts/join.log").read_text()
+        self.assertIn(f"of {TASKS} renders, guided by albedo and normal", log)
         self.assertTrue((self.path / "out.exr").exists())
 
     def render_frames(self, samples, *options, frames="1-3", **keywords):

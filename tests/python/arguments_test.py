@@ -53,7 +53,8 @@ RENDER = {"scene": (*NO_SCENE, ""), "spp": without_none(NO_SPP), "estimator": ("
           "preview": (True, *NO_FLAG), "aovs": NO_FLAG, "aov_samples": (0, -1, 2.5, "12"),
           "layers": ("dirct", *NO_TEXT),
           "crop": (3, "0,0,4,4", (0, 0, 4), (0, 0, 0, 0), (-1, 0, 4, 4), (0, 0, 4.5, 4), (0, 0, 400, 4)),
-          "filter": ("bx", *NO_TEXT), "exposure": ("bright", *NO_TEXT), "sampling": ("common", *NO_TEXT), "sampler": ("halton", *NO_TEXT),
+          "filter": ("bx", *NO_TEXT),
+          "exposure": ("bright", [1]), "sampling": ("common", *NO_TEXT), "sampler": ("halton", *NO_TEXT),
           "groups": (0, -1, 1025, 2.5, "12"),
           "split": (1, "1:1", "half", (1,), (1, 0), (1, -1), ("1", 1)), "films_only": NO_FLAG, "save_training": NO_PATH,
           "load_training": NO_PATH, "progress": NO_FUNCTION}
