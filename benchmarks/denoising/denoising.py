@@ -93,6 +93,13 @@ class Scene:
         return [self.render("reference", spp, seed, "--estimator", "none", "--denoise", "none")
                 for seed in REFERENCE_SEEDS]
 
+    def denoised_references(self):
+        for reference in self.references():
+            output = reference.with_stem(reference.stem + "-denoised")
+            if not output.exists():
+                self.run("denoise", reference, "--mode", "oidn", "--quiet", "-o", output)
+            yield read_image(output)
+
     def image(self, method, spp, seed):
         """The path of the image that a method makes of so many samples."""
         if method == "iicv":
@@ -121,9 +128,10 @@ class Scene:
         return relmse["relmse"], flip["flip"]
 
     def squared_bias(self, images):
-        """Mean over pairs of seeds of (M1 - R1)(M2 - R2) over the squared reference: noise of neither is in it."""
+        """Mean over pairs of seeds of (M1 - R1)(M2 - R2) / (D^2 + 0.01), D: each reference denoised. Noise of the images
+        and of the references cancels."""
         first, second = map(read_image, self.references())
-        weight = 1 / (((first + second) / 2).mean(2, keepdims=True)**2 + 0.01)
+        weight = sum(1 / (image.mean(2, keepdims=True)**2 + 0.01) for image in self.denoised_references()) / 2
         images = [read_image(path) for path in images]
         pairs = [(weight * ((a - first) * (b - second) + (a - second) * (b - first)) / 2).mean()
                  for a, b in itertools.combinations(images, 2)]
