@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
+#include <span>
+#include <vector>
 
 #include "core/arena.h"
 #include "core/parallel.h"
@@ -73,18 +75,16 @@ bool ends_in_medium(const Scene& scene, const PathRandom& random, Ray& ray, Auxi
   }
 }
 
-AuxiliarySample auxiliary_sample(const Scene& scene, const CameraSample& sample, Arena& arena) {
+/// Values of a camera ray that hits a surface: those of the first one, and of the one behind mirrors and glass.
+AuxiliarySample surface_sample(const Scene& scene, const PathRandom& random, const Ray& ray, SurfaceHit& hit,
+                               Arena& arena) {
   AuxiliarySample values{};
-  Ray ray = sample.ray;
-  if (scene.has_media() && ends_in_medium(scene, sample.random, ray, values)) return values;
-  SurfaceHit hit;
-  if (!scene.intersect(ray, hit)) return values;
   values[0] = values[3] = to_vec(hit.bsdf->albedo(hit));
   values[1] = values[4] = hit.frame.n;
-  values[2] = hit.p;
+  values[kPosition] = hit.p;
   if (hit.bsdf_flags & kSmooth) return values;
   Spectrum throughput(1);
-  if (!follow(scene, sample.random, arena, ray, hit, throughput)) {
+  if (!follow(scene, random, arena, ray, hit, throughput)) {
     values[3] = values[4] = {};
     return values;
   }
@@ -94,17 +94,54 @@ AuxiliarySample auxiliary_sample(const Scene& scene, const CameraSample& sample,
   return values;
 }
 
+/// Samples begin … end - 1 of a pixel, at most kRound, whose camera rays are traced together.
+class Round {
+ public:
+  Round(const Scene& scene, const PassSettings& settings) : scene_(scene), settings_(settings) {}
+
+  /// Valid until the next call.
+  std::span<const AuxiliarySample> trace(int x, int y, uint32_t begin, uint32_t end) {
+    const size_t n = end - begin;
+    randoms_.clear();
+    for (size_t i = 0; i < n; ++i) {
+      const CameraSample sample = camera_sample(scene_, settings_, x, y, begin + i);
+      randoms_.push_back(sample.random);
+      rays_[i] = sample.ray, values_[i] = {};
+    }
+    if (!scene_.has_media()) scene_.nearest(std::span(rays_).first(n), std::span(hits_).first(n), true);
+    for (size_t i = 0; i < n; ++i) {
+      SurfaceHit hit;
+      if (scene_.has_media()) {
+        if (ends_in_medium(scene_, randoms_[i], rays_[i], values_[i]) || !scene_.intersect(rays_[i], hit)) continue;
+      } else {
+        if (!hits_[i].found()) continue;
+        scene_.resolve(rays_[i], hits_[i], hit);
+      }
+      values_[i] = surface_sample(scene_, randoms_[i], rays_[i], hit, arena_);
+    }
+    return std::span(values_).first(n);
+  }
+
+ private:
+  const Scene& scene_;
+  const PassSettings& settings_;
+  Arena arena_;
+  std::vector<PathRandom> randoms_;
+  std::array<Ray, kRound> rays_;
+  std::array<RayHit, kRound> hits_;
+  std::array<AuxiliarySample, kRound> values_;
+};
+
 /// Means over the samples of a pixel: `most`, or as many rounds as it takes to reach kTolerance.
-AuxiliarySample auxiliary_means(const Scene& scene, const PassSettings& settings, int x, int y, uint32_t most,
-                                Arena& arena) {
+AuxiliarySample auxiliary_means(Round& round, int x, int y, uint32_t most) {
   AuxiliarySample sums{}, squares{};
   float largest = kInfinity;  // variance of the means, over albedos and normals
   uint32_t n = 0;
   while (n < most && largest > sqr(kTolerance)) {
-    for (const uint32_t end = std::min(most, n + kRound); n < end; ++n) {
-      const AuxiliarySample values = auxiliary_sample(scene, camera_sample(scene, settings, x, y, n), arena);
+    const uint32_t end = std::min(most, n + kRound);
+    for (const AuxiliarySample& values : round.trace(x, y, n, end))
       for (size_t i = 0; i < kImages; ++i) sums[i] += values[i], squares[i] += values[i] * values[i];
-    }
+    n = end;
     largest = 0;
     const auto count = static_cast<float>(n);
     for (size_t i = 0; i < kImages; ++i)
@@ -126,9 +163,9 @@ void render_aovs(const Scene& scene, const PassSettings& pass, uint32_t most, Fi
   const auto stopped = [&] { return stop && stop->load(std::memory_order_relaxed); };
   parallel_for(film.height(), [&](int y) {
     if (stopped()) return;
-    Arena arena;
+    Round round(scene, settings);
     for (int x = 0; x < film.width(); ++x) {
-      const AuxiliarySample means = auxiliary_means(scene, settings, film.crop().x + x, film.crop().y + y, most, arena);
+      const AuxiliarySample means = auxiliary_means(round, film.crop().x + x, film.crop().y + y, most);
       for (size_t i = 0; i < kImages; ++i)
         for (int c = 0; c < 3; ++c) images[i].pixel(x, y)[c] = means[i][c];
     }
