@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/stopwatch.h"
 #include "denoising/mixed_denoising.h"
 #include "estimators/mean.h"
 #include "plans/budget.h"
@@ -87,13 +88,13 @@ void check_budget(const Method& method, const PlanState& state, uint32_t first) 
                           budget, method.name, first, least));
 }
 
-/// Samples per pixel for which the remaining time suffices.
-double samples_in_time(const PlanState& state) {
+/// Samples per pixel for which the time suffices that was left `seconds_ago`.
+double samples_in_time(const PlanState& state, double seconds_ago) {
   const CropWindow window = window_of(state.scene, state.request);
   const FilterSettings filter = state.request.filter.value_or(state.scene.filter);
   const double speed = samples_per_second(state.scene, *state.integrator, filter, window, state.stop);
   const double pixels = static_cast<double>(window.width) * window.height;
-  return std::floor(std::max(1.0, kOverestimate * std::max(0.0, *state.seconds_left) * speed / pixels));
+  return std::floor(std::max(1.0, kOverestimate * std::max(0.0, *state.seconds_left - seconds_ago) * speed / pixels));
 }
 
 /// Whether an error map of these samples shows where errors are, rather than where single bright paths landed.
@@ -104,9 +105,8 @@ bool tells_where_errors_are(const GroupedImage& image) {
 }
 
 void set_last_target(const Method& method, const PlanState& state, Pass& last) {
+  const Stopwatch watch;
   const Film& first = state.passes[0].film;
-  double budget = whole_budget(method, state) - first.mean_count();
-  if (state.seconds_left) budget = std::min(budget, samples_in_time(state));
   const GroupedImage image = rows_of(first, 0, first.height());
   CountOptions options = method.sampling.counts;
   const uint32_t multiple = method.denoise ? 1 : method.groups_of(state);
@@ -117,6 +117,8 @@ void set_last_target(const Method& method, const PlanState& state, Pass& last) {
     else
       options.allocation = Allocation::kUniform;
   }
+  double budget = whole_budget(method, state) - first.mean_count();
+  if (state.seconds_left) budget = std::min(budget, samples_in_time(state, watch.seconds()));
   std::vector<uint32_t> counts = sample_counts(image, std::max(0.0, budget), options, multiple, filtered);
   last.misses_error = !have_relative_error(image, counts, options, multiple);
   last.settings.spp = SampleTarget(std::move(counts));

@@ -98,21 +98,19 @@ bool PlanRun::render_to_limits() {
   warn_of_other_sampler();
   TrainingSettings settings{window_, filter_, callbacks_.stop, callbacks_.progress, {}};
   if (plan_.takes_training) settings.image = &result_.training;
-  if (integrator_->learning() && request_.load_training.empty()) begin(RenderStage::kTraining);
+  if (integrator_->learning() && request_.load_training.empty()) {
+    begin(RenderStage::kTraining);
+    if (timed()) warn_of_long_training();
+  }
   if (!train(scene_, request_, *integrator_, settings, result_.seconds)) return false;
   const uint32_t limit = largest_budget(scene_, request_);
   state_.budget = state_.group_budget = rounds_.budget();
-  if (in_rounds()) {
-    plan_rounds();
+  if (timed()) {
+    const double before = watch_.seconds();
+    plan_time_limit();
     if (stopped()) return false;
-  } else if (timed() && plan_.groups_follow_speed) {
-    // The number of samples possible in half of the time, so that no more groups are begun than can be filled.
-    const double samples =
-        0.5 * request_.seconds * samples_per_second(scene_, *state_.integrator, filter_, window_, callbacks_.stop);
-    state_.group_budget =
-        static_cast<uint32_t>(std::min<double>(state_.budget, samples / window_.width / window_.height));
+    result_.seconds.trial = watch_.seconds() - before;
   }
-  if (timed()) result_.seconds.trial = watch_.seconds();
   for (bool first = true;; first = false) {
     double share = 0;
     for (size_t i = 0; i < plan_.phases.size(); ++i) {
@@ -147,9 +145,8 @@ bool PlanRun::render_to_limits() {
 }
 
 double PlanRun::seconds_left(size_t phase, double share) {
-  if (phase + 1 < plan_.phases.size()) return share * request_.seconds - watch_.seconds();
-  if (!estimate_seconds_) estimate_seconds_ = time_estimate();
-  return request_.seconds - watch_.seconds() - *estimate_seconds_;
+  if (phase + 1 < plan_.phases.size()) return share * (request_.seconds - reserved_seconds_) - watch_.seconds();
+  return request_.seconds - watch_.seconds() - estimate_seconds_.value_or(costs_.end);
 }
 
 bool PlanRun::render_phase(size_t index, double share) {
@@ -159,7 +156,7 @@ bool PlanRun::render_phase(size_t index, double share) {
   if (passes.empty()) return false;  // interrupted before its films were created
   if (index + 1 == plan_.phases.size() && needs_aovs() && result_.aovs.empty()) render_auxiliary_images();
   state_.guides = guides();
-  if (timed() && !in_rounds()) state_.seconds_left = request_.seconds - watch_.seconds();
+  if (timed() && !in_rounds()) state_.seconds_left = seconds_left(index, share);
   if (request_.until > 0) {
     state_.budget = rounds_.budget();  // an earlier call's film may have recorded it
     for (Pass& pass : state_.passes) pass.film.attributes[film_key::kBudgets] = rounds_.text();

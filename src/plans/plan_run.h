@@ -31,7 +31,9 @@ class PlanRun {
   bool render_phase(size_t index, double share);
   double seconds_left(size_t phase, double share);
   /// Measures what the parts of the render take, warns if even the least takes too long, and sets the first budget.
-  void plan_rounds();
+  void plan_time_limit();
+  void warn_of_long_training() const;
+  std::vector<PassPlan> passes_with(uint32_t group_budget) const;
   TimeCosts measure_costs();
   double time_of_end(double seconds_per_sample);
   double end_of_band(int n_rows, std::span<const PassPlan> plans);
@@ -55,7 +57,6 @@ class PlanRun {
   void warn_of_missing_light() const;
   void warn_of_other_sampler() const;
   bool estimate();
-  double time_estimate();
   void render_auxiliary_images();
   void trace_layers();
   void add_path_lengths();
@@ -134,9 +135,10 @@ class PlanRun {
   bool unsaved_ = false;                          // they have samples that have not been written
   double estimate_stopped_after_ = 0;             // seconds
   std::optional<double> estimate_seconds_;        // of the next estimate
-  TimeCosts costs_;                               // with in_rounds(), like the two below
+  TimeCosts costs_;                               // with a time limit
   uint32_t aov_samples_;                          // RenderRequest::aov_samples, or fewer
   double round_seconds_ = 0, round_samples_ = 0;  // of all rounds of this call
+  double reserved_seconds_ = 0;                   // that earlier phases leave: images, files, auxiliary images
 };
 
 }  // namespace covary

@@ -26,7 +26,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kTrialRows = 64;  // minimum, if the estimate is timed
 /// Seconds of work after which films are worth saving, even unasked, before the image is computed from them.
 constexpr double kWorthKeeping = 10;
 constexpr double kEstimateOfInterrupted = 0.5;  // seconds allowed for it; after that the image is the mean
@@ -82,18 +81,6 @@ bool PlanRun::estimate() {
   estimate_seconds_ = watch.seconds();
   result_.seconds.estimate += *estimate_seconds_;
   return true;
-}
-
-/// Predicted duration of the estimate in seconds, from a trial on rows in the middle: it depends on sizes, not on
-/// samples.
-double PlanRun::time_estimate() {
-  if (plan_.film_is_image() || request_.films_only) return 0;  // at most a mean
-  const Stopwatch watch;
-  const int height = window_.height, n_rows = std::min(height, std::max(kTrialRows, height / 8));
-  run_stoppable(callbacks_.stop, [&] { estimate_rows((height - n_rows) / 2, n_rows); });
-  const double seconds = watch.seconds();
-  result_.seconds.trial += seconds;
-  return seconds * height / n_rows;
 }
 
 void PlanRun::render_auxiliary_images() {

@@ -14,6 +14,7 @@
 #include "core/stop.h"
 #include "film/film_file.h"
 #include "integrators/aov.h"
+#include "passes/training.h"
 #include "plans/pass_files.h"
 #include "plans/plan_run.h"
 #include "plans/result_files.h"
@@ -25,6 +26,10 @@ namespace fs = std::filesystem;
 
 /// Rows of two trials of the estimate, whose difference leaves out what does not depend on the size.
 constexpr int kFewRows = 16, kMoreRows = 48;
+/// A trial of training takes one pixel in each square of this side. Training that takes a larger share of the time is
+/// told beforehand.
+constexpr int kTrainingStride = 8;
+constexpr double kTrainingShare = 0.5;
 
 /// Uniform in [0, 1).
 float number(size_t i) { return PathRandom(Sampling::kIndependent, 1, 0, i, 0).get_1d(0, Event::kPixel); }
@@ -93,10 +98,36 @@ double PlanRun::end_of_band(int n_rows, std::span<const PassPlan> plans) {
   return watch.seconds();
 }
 
+void PlanRun::warn_of_long_training() const {
+  if (!callbacks_.warning || !request_.load_training.empty()) return;
+  const std::shared_ptr<Integrator> trial = integrator_->clone();
+  trial->prepare(*scene_.scene);
+  TrainingSettings settings{window_, filter_, callbacks_.stop, {}, {}};
+  settings.seed = request_.seed, settings.stride = kTrainingStride;
+  const Stopwatch watch;
+  if (!train(*scene_.scene, *trial->learning(), settings)) return;
+  const double updates = trial->learning()->update_seconds();  // hardly depend on the number of pixels
+  const double seconds = sqr(kTrainingStride) * (watch.seconds() - updates) + updates;
+  if (seconds > kTrainingShare * request_.seconds)
+    callbacks_.warning(fmt::format("of `time` {:g}, training with {} samples per pixel takes about {:.2g} s",
+                                   request_.seconds, trial->learning()->training_spp(), seconds));
+}
+
+/// The passes of all phases, with this number of samples per pixel for groups.
+std::vector<PassPlan> PlanRun::passes_with(uint32_t group_budget) const {
+  PlanState state = state_;
+  state.group_budget = group_budget;
+  std::vector<PassPlan> all;
+  for (const Phase& phase : plan_.phases) {
+    const std::vector<PassPlan> passes = phase.passes(state);
+    all.insert(all.end(), passes.begin(), passes.end());
+  }
+  return all;
+}
+
 double PlanRun::time_of_end(double seconds_per_sample) {
-  state_.group_budget = static_cast<uint32_t>(
-      std::clamp(0.5 * request_.seconds / seconds_per_sample, 1.0, static_cast<double>(state_.budget)));
-  const std::vector<PassPlan> plans = plan_.phases[0].passes(state_);
+  const std::vector<PassPlan> plans = passes_with(static_cast<uint32_t>(
+      std::clamp(0.5 * request_.seconds / seconds_per_sample, 1.0, static_cast<double>(state_.budget))));
   const int height = window_.height;
   end_of_band(std::min(height, kFewRows), plans);  // loads and warms what the others use
   const double few = end_of_band(std::min(height, kFewRows), plans);
@@ -116,28 +147,32 @@ TimeCosts PlanRun::measure_costs() {
   return costs;
 }
 
-void PlanRun::plan_rounds() {
+void PlanRun::plan_time_limit() {
   const Stopwatch watch;
   const uint32_t limit = largest_budget(scene_, request_);
   costs_ = measure_costs();
   if (stopped()) return;
-  state_.group_budget = 1;
-  const uint32_t fewest = sum_of_groups(plan_.phases[0].passes(state_));
-  result_.seconds.trial = watch.seconds();
+  // Where a later phase's samples depend on a denoised first pass, that takes as long as the image.
+  const double between = static_cast<double>(plan_.phases.size() - 1) * costs_.end;
   const double left = request_.seconds - watch_.seconds();
-  const TimePlan plan = plan_time(costs_, left, fewest, aov_samples_);
+  TimePlan plan = plan_time(costs_, left - between, sum_of_groups(passes_with(1)), aov_samples_);
+  plan.seconds += between;
   if (plan.seconds > left && callbacks_.warning)
     callbacks_.warning(fmt::format(
         "`time` {:g} is too short: the least takes about {:.2g} s ({}{:.2g} for {} samples per pixel, {:.2g} for the "
         "image and its files)",
         request_.seconds, watch_.seconds() + plan.seconds,
         costs_.auxiliary > 0 ? fmt::format("{:.2g} for auxiliary images, ", plan.aov_samples * costs_.auxiliary) : "",
-        plan.samples * costs_.sample, plan.samples, costs_.end));
+        plan.samples * costs_.sample, plan.samples, between + costs_.end));
   if (needs_aovs()) aov_samples_ = plan.aov_samples;
-  // No more groups are begun than can be filled if the trials were wrong by a factor of two.
-  state_.group_budget = std::max(1u, std::min(limit, plan.samples / 2));
-  const uint32_t least = sum_of_groups(plan_.phases[0].passes(state_));
-  state_.budget = std::min(limit, first_round(plan, least));
+  // No more groups are begun than can be filled if the trials were wrong by a factor of two; an error needs groups.
+  const uint32_t fewest = request_.until > 0 ? state_.budget : 1;
+  if (in_rounds() || plan_.groups_follow_speed)
+    state_.group_budget = std::max(fewest, std::min(limit, plan.samples / 2));
+  if (in_rounds())
+    state_.budget = std::min(limit, first_round(plan, sum_of_groups(passes_with(state_.group_budget))));
+  else
+    reserved_seconds_ = between + plan.aov_samples * costs_.auxiliary + costs_.end;
 }
 
 bool PlanRun::next_round_fits() {

@@ -536,9 +536,20 @@ class Time(RenderTest):
                 self.assertEqual(read_exr(timed), read_exr((self.path / "b.exr").read_bytes()))
 
     def test_too_short_a_time_is_told_beforehand(self):
-        result = self.good("render", ROOM, "--resolution", "400x300", "-o", "a.exr", "--time", "0.001", *IICV)
-        self.assertRegex(result.stderr, r"warning: --time 0.001 is too short: the least takes about [0-9.e-]+ s \(")
-        self.assertLess(result.stderr.index("too short"), result.stderr.index("was exceeded"))
+        for options in (IICV, [*IICV, "--adaptive"], ["--oidn", "off", "--adaptive"],
+                        ["--oidn", "off", "--until", "relmse=100"]):
+            with self.subTest(options):
+                result = self.good("render", ROOM, "--resolution", "200x150", "-o", "a.exr", "--time", "0.001", *options,
+                                   "--overwrite")
+                self.assertRegex(result.stderr, r"warning: --time 0.001 is too short: the least takes about [0-9.e-]+ "
+                                                r"s \(")
+                late = result.stderr.find("was exceeded")
+                self.assertTrue(late < 0 or result.stderr.index("too short") < late, result.stderr)
+
+    def test_training_that_takes_most_of_the_time_is_told_beforehand(self):
+        result = self.good("render", ROOM, "--resolution", "64x48", "-o", "a.exr", "--time", "0.01", "--estimator",
+                           "none", "--denoise", "none", "--integrator", "guided-path")
+        self.assertRegex(result.stderr, r"\Awarning: of --time 0.01, training with 16 samples per pixel takes about ")
 
     def test_with_until(self):
         facts = self.timed(60, "iicv", "--until", "relmse=0.02", resolution="64x48")
