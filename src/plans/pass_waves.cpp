@@ -56,6 +56,52 @@ uint32_t light_limit(const Pass& pass, std::optional<double> seconds) {
   return pass.count + static_cast<uint32_t>(n_groups) * groups;
 }
 
+/// Samples at the end of the pass's next wave; a small one takes about a second, or a sample per pixel.
+uint32_t camera_limit(const Pass& pass, bool small) {
+  const uint32_t end = wave_end(pass.count, pass.film.groups());
+  if (!small) return end;
+  const auto pixels = static_cast<double>(pass.film.counts().size());
+  const double per_second = static_cast<double>(pass.result.n_samples) / std::max(pass.result.seconds, 1e-9) / pixels;
+  const double more = std::clamp(per_second, 1.0, std::max(1.0, static_cast<double>(pass.count)));
+  return static_cast<uint32_t>(std::min<double>(end, pass.count + more));
+}
+
+/// The pass's own targets in `region`, and outside what the film has: the region's samples are taken first, and no
+/// pixel gets others than without it.
+SampleTarget target_in(const CropWindow& region, const Pass& pass) {
+  const CropWindow& window = pass.film.crop();
+  std::vector<uint32_t> map = pass.film.counts();
+  for (int y = 0; y < window.height; ++y)
+    for (int x = 0; x < window.width; ++x) {
+      const int fx = window.x + x - region.x, fy = window.y + y - region.y;
+      const size_t i = static_cast<size_t>(y) * window.width + x;
+      if (fx >= 0 && fy >= 0 && fx < region.width && fy < region.height)
+        map[i] = std::max(map[i], pass.settings.spp.at(i));
+    }
+  return SampleTarget(std::move(map));
+}
+
+/// If passes lack samples in the region: makes the next wave one of the pass that is furthest behind there, and in it.
+void narrow_to_region(const WaveLimits& limits, std::span<Pass> passes, Pass*& next, PassSettings& wave) {
+  const std::optional<CropWindow> region = limits.region ? limits.region() : std::nullopt;
+  if (!region) return;
+  Pass* behind = nullptr;
+  uint32_t fewest = UINT32_MAX;
+  for (Pass& pass : passes) {
+    if (pass.plan.light || pass.settings.estimate) continue;
+    SampleTarget target = target_in(*region, pass);
+    if (target.missing(pass.film) == 0) continue;
+    const uint32_t reached = target.reached(pass.film);
+    if (behind && reached >= fewest) continue;
+    behind = &pass, fewest = reached;
+    wave = pass.settings;
+    wave.spp = std::move(target);
+  }
+  if (!behind) return;
+  next = behind;
+  wave.limit = wave_end(fewest, behind->film.groups());
+}
+
 PassResult render_wave(const Scene& scene, const Pass& pass, const PassSettings& settings, Film& film) {
   if (!pass.plan.light) return render_pass(scene, *pass.integrator, settings, film);
   return render_light_pass(scene, *light_tracer(*pass.integrator), settings, film);
@@ -69,11 +115,12 @@ uint64_t render_passes(const Scene& scene, std::span<Pass> passes, const WaveLim
   uint64_t done = 0;
   const auto stopped = [&] { return limits.stop && limits.stop->load(); };
   for (;;) {
-    Pass* const next = next_pass(passes);
+    Pass* next = next_pass(passes);
     if (!next || stopped()) return done;
+    PassSettings wave = next->settings;
+    if (!wave.estimate) wave.limit = camera_limit(*next, limits.small_waves);
+    narrow_to_region(limits, passes, next, wave);
     Pass& pass = *next;
-    PassSettings wave = pass.settings;
-    if (!wave.estimate) wave.limit = wave_end(pass.count, pass.film.groups());
     if (pass.plan.light) wave.limit = light_limit(pass, {});
     wave.stop = limits.stop;
     wave.checkpoint = wave.estimate ? limits.wave : nullptr;  // this is the only wave

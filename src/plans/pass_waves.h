@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 
 #include "plans/plan.h"
@@ -17,6 +18,8 @@ struct WaveLimits {
   std::function<double()> seconds_left;
   std::function<void(uint64_t done, uint64_t total)> progress;  ///< samples and light paths of all passes together
   std::function<void()> wave;                                   ///< called between waves
+  bool small_waves = false;                                     ///< RenderCallbacks::small_waves
+  std::function<std::optional<CropWindow>()> region;            ///< RenderCallbacks::region
 };
 
 /// Renders all passes up to their settings.spp, wave by wave; the pass that is furthest behind is next, so that passes

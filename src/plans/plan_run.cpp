@@ -50,7 +50,7 @@ PlanRun::PlanRun(const LoadedScene& scene, const Plan& plan, const RenderRequest
       window_(window_of(scene, request)),
       filter_(request.filter.value_or(scene.filter)),
       integrator_(prepared_integrator(scene, plan, request)),
-      state_{scene, request, callbacks.stop, integrator_, 0, 0, {}},
+      state_{scene, request_, callbacks.stop, integrator_, 0, 0, {}},
       rounds_(first_budget(scene, request)),
       aov_samples_(request.aov_samples) {
   plan_.traces_light = has_light_pass(scene, plan, request);
@@ -103,7 +103,6 @@ bool PlanRun::render_to_limits() {
     if (timed()) warn_of_long_training();
   }
   if (!train(scene_, request_, *integrator_, settings, result_.seconds)) return false;
-  const uint32_t limit = largest_budget(scene_, request_);
   state_.budget = state_.group_budget = rounds_.budget();
   if (timed()) {
     const double before = watch_.seconds();
@@ -122,6 +121,7 @@ bool PlanRun::render_to_limits() {
       continue;
     }
     keep_choice();
+    if (wants_more()) continue;
     if (rounds_.repeat()) {
       state_.budget = rounds_.budget();
       continue;
@@ -137,11 +137,24 @@ bool PlanRun::render_to_limits() {
                                : *result_.predicted);
     if (in_rounds()) return true;
     const bool out_of_time = timed() && seconds_left(plan_.phases.size() - 1, 1) <= 0;
+    if (!out_of_time && wants_more()) continue;
+    const uint32_t limit = largest_budget(scene_, request_);
+    if (request_.until > 0) result_.until_reached = error_to_limit() <= request_.until;
     if (result_.until_reached.value_or(true) || state_.budget >= limit || out_of_time) return true;
     rounds_.add(next_budget(state_.budget, error_to_limit(), request_.until, limit,
                             result_.predicted->doubt.empty() ? kMostGrowth : kDoubtfulGrowth));
     state_.budget = rounds_.budget();
   }
+}
+
+/// Takes the goal that the caller may have raised; without a target error, true if it needs more samples.
+bool PlanRun::wants_more() {
+  if (!callbacks_.goal || timed()) return false;
+  callbacks_.goal(request_);
+  const uint32_t largest = largest_budget(scene_, request_);
+  if (request_.until > 0 || state_.budget >= largest) return false;
+  state_.budget = largest;
+  return true;
 }
 
 double PlanRun::seconds_left(size_t phase, double share) {
@@ -175,6 +188,8 @@ bool PlanRun::render_phase(size_t index, double share) {
       callbacks_.progress(done_ + done, done_ + total + later);
     };
   limits.wave = [this] { between_waves(); };
+  limits.small_waves = callbacks_.small_waves && !timed();  // time must not end before each group has a sample
+  limits.region = callbacks_.region;
   consistent_ = false;
   const Stopwatch watch;
   const double before = camera_samples();

@@ -57,6 +57,7 @@ class PlanRun {
   void warn_of_missing_light() const;
   void warn_of_other_sampler() const;
   bool estimate();
+  bool wants_more();
   void render_auxiliary_images();
   void trace_layers();
   void add_path_lengths();
@@ -117,7 +118,7 @@ class PlanRun {
 
   const LoadedScene& scene_;
   Plan plan_;
-  const RenderRequest& request_;
+  RenderRequest request_;  // the goal may be raised
   const RenderCallbacks& callbacks_;
   const CropWindow window_;
   const FilterSettings filter_;

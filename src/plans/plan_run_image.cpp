@@ -55,7 +55,11 @@ bool PlanRun::estimate() {
   if (result_.interrupted && estimate_stopped_after_ > kEstimateOfInterrupted) return false;
   begin(RenderStage::kEstimating);
   const Stopwatch watch;
-  const auto ends = [&] { return result_.interrupted ? watch.seconds() > kEstimateOfInterrupted : stopped(); };
+  const bool whole = callbacks_.whole_image && callbacks_.whole_image->load();
+  const auto ends = [&] {
+    if (result_.interrupted && whole) return false;
+    return result_.interrupted ? watch.seconds() > kEstimateOfInterrupted : stopped();
+  };
   EstimatorResult image;
   result_.image = {};
   result_.predicted.reset();
@@ -76,6 +80,7 @@ bool PlanRun::estimate() {
   if (result_.predicted) result_.predicted_blocks = predicted_blocks(image);
   if (request_.until > 0 && !result_.predicted)
     throw Error(ErrorCode::kUsage, "an error can only be predicted from 2 or more groups");
+  if (callbacks_.estimated) callbacks_.estimated(image, result_.predicted);
   if (plan_.film_is_image()) image.estimate = {};
   result_.image = std::move(image);
   estimate_seconds_ = watch.seconds();
@@ -88,6 +93,7 @@ void PlanRun::render_auxiliary_images() {
   Pass& last = state_.passes[camera_passes(state_.passes).size() - 1];
   render_aovs(*scene_.scene, last.settings, aov_samples_, last.film, callbacks_.stop);
   result_.aovs = std::exchange(last.film.aovs, {});
+  if (callbacks_.auxiliary && !stopped()) callbacks_.auxiliary(result_.aovs);
   result_.seconds.auxiliary = watch.seconds();
 }
 

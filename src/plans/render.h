@@ -35,6 +35,20 @@ struct RenderCallbacks {
   /// Between waves, when films may be read; about twice a second in passes of a single wave.
   std::function<void(std::span<const Pass>)> wave;
   std::function<void(const std::string&)> warning;
+
+  // For somebody who watches. None of these changes the bits of an image with the same samples.
+  /// Waves of 1, 2, 4, … samples per pixel, of about a second at most, so that there is soon something to see.
+  bool small_waves = false;
+  /// Once the images that guide a denoiser are there; they remain until the render ends.
+  std::function<void(const std::map<std::string, Image>&)> auxiliary;
+  /// After each estimate of the whole image, with its predicted error, if any.
+  std::function<void(const EstimatorResult&, const std::optional<PredictedError>&)> estimated;
+  /// Asked between waves: pixels, in the frame, that get their samples before all others.
+  std::function<std::optional<CropWindow>()> region;
+  /// Asked when all samples are there, unless there is a time limit: may raise `spp`, or set a smaller `until`.
+  std::function<void(RenderRequest&)> goal;
+  /// If true, a render that `stop` ends still makes the whole image, however long that takes.
+  const std::atomic<bool>* whole_image = nullptr;
 };
 
 struct RenderSeconds {
