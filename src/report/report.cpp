@@ -102,37 +102,34 @@ void check(const Json& document, const std::vector<ReportImage>& images) {
     for (const Json& block : section.value("blocks", Json::array())) check_block(block, sizes);
 }
 
-std::string styles() {
+std::string styles(std::string_view own = "") {
   std::string text;
-  append(text, {report_files::page_css, report_files::comparer_css});
+  append(text, {report_files::page_css, report_files::comparer_css, own});
   return text;
 }
 
 /// All scripts wrapped in one function to keep their names out of the page's global scope; later files use earlier
 /// ones.
-std::string scripts() {
+std::string scripts(std::string_view main) {
   using namespace report_files;
   std::string text;
   append(text, {"(() => {", "\"use strict\";", dom_js,     format_js,   images_js,   tone_js,     colour_js,
                 ssim_js,    views_js,          link_js,    viewport_js, painter_js,  stage_js,    insets_js,
                 figure_js,  histogram_js,      readout_js, frames_js,   controls_js, gestures_js, comparer_js,
-                table_js,   plot_js,           page_js,    "})();"});
+                table_js,   plot_js,           main,       "})();"});
   return text;
 }
 
 /// page.html with each {{name}} substituted.
-std::string fill_page(const Json& document, const std::vector<ReportImage>& images) {
-  Json data = document;
-  data["error_colours"] = error_colours();
-  data["image_sizes"] = Json::object();
-  for (const auto& [id, pixels] : images) data["image_sizes"][id] = {pixels.width, pixels.height, pixels.channels};
+std::string fill_page(const std::string& title, Json document, const std::string& styles, const std::string& scripts) {
+  document["error_colours"] = error_colours();
   const std::array<std::pair<std::string_view, std::string>, 6> values{{
-      {"title", escaped_html(document.value("title", "covary"))},
-      {"styles", styles()},
+      {"title", escaped_html(title)},
+      {"styles", styles},
       {"licence", std::string(report_files::chart_licence_txt)},
       {"library", std::string(report_files::chart_min_js)},
-      {"document", script_json(data)},
-      {"scripts", scripts()},
+      {"document", script_json(document)},
+      {"scripts", scripts},
   }};
   const std::string_view page = report_files::page_html;
   std::string text;
@@ -171,10 +168,17 @@ void write_images(OutputFile& file, const std::vector<ReportImage>& images) {
 void write_report(const std::string& path, const Json& document, const std::vector<ReportImage>& images) {
   check(document, images);
   OutputFile file(path);
-  const std::string page = fill_page(document, images);
+  Json data = document;
+  data["image_sizes"] = Json::object();
+  for (const auto& [id, pixels] : images) data["image_sizes"][id] = {pixels.width, pixels.height, pixels.channels};
+  const std::string page = fill_page(document.value("title", "covary"), data, styles(), scripts(report_files::page_js));
   file.write(page.data(), page.size());
   write_images(file, images);
   file.commit();
+}
+
+std::string script_page(const std::string& title, std::string_view own_styles, std::string_view script) {
+  return fill_page(title, Json::object(), styles(own_styles), scripts(script));
 }
 
 }  // namespace covary

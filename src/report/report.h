@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "film/film.h"
@@ -23,5 +24,9 @@ struct ReportImage {
 /// an image has neither 1 nor 3 channels.
 void write_report(const std::string& path, const nlohmann::ordered_json& document,
                   const std::vector<ReportImage>& images);
+
+/// The page without a document: it has the elements `head` and `content`, the comparer, tables and plots, and the names
+/// of their scripts for `script`, which replaces page.js. `styles` follow those of a report.
+std::string script_page(const std::string& title, std::string_view styles, std::string_view script);
 
 }  // namespace covary
