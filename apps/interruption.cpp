@@ -47,6 +47,10 @@ StopFlag::~StopFlag() { g_kept = false; }
 
 const std::atomic<bool>* StopFlag::token() const { return &g_stop; }
 
+void request_stop() {
+  if (g_kept) g_stop = true;
+}
+
 bool StopFlag::is_set() const { return g_stop; }
 
 int StopFlag::exit_code() const { return 128 + g_signal; }

@@ -26,4 +26,7 @@ class StopFlag {
   int exit_code() const;
 };
 
+/// As the first signal does: sets the flag of the StopFlag that lives, if any.
+void request_stop();
+
 }  // namespace covary

@@ -21,6 +21,7 @@
 #include "film/outputs.h"
 #include "interruption.h"
 #include "json_output.h"
+#include "live.h"
 #include "plans/render.h"
 #include "plans/result_files.h"
 #include "progress.h"
@@ -74,7 +75,7 @@ const char* name_of(RenderStage stage, const RenderOptions& options) {
 }  // namespace
 
 RenderResult render_watched(const RenderOptions& options, const LoadedScene& scene, const RenderRequest& request,
-                            Display* display, ProgressLine& progress, const StopFlag& stop) {
+                            Display* display, ProgressLine& progress, const StopFlag& stop, LiveRender* live) {
   Stopwatch since_preview;
   RenderCallbacks callbacks;
   callbacks.stop = stop.token();
@@ -93,7 +94,9 @@ RenderResult render_watched(const RenderOptions& options, const LoadedScene& sce
     fmt::print(stderr, "warning: {}\n", as_flags(text));
   };
   progress.limit(options.request().seconds);
-  RenderResult result = covary::render(scene, make_plan(options), request, callbacks);
+  const Plan plan = make_plan(options);
+  RenderResult result =
+      live ? live->render(scene, plan, request, callbacks) : covary::render(scene, plan, request, callbacks);
   progress.finish();
   if (display && !result.passes.empty()) display->update(result.picture());
   return result;
@@ -136,24 +139,24 @@ void report(const RenderReport& report, const StopFlag& stop) {
     fmt::print(stderr, "note: '{}' is exposed by {:+g} stops, or much of it would be burnt or black (--exposure)\n",
                preview_path(options.request().output), result.preview_stops);
   if (!options.quiet) print_summary(report);
+  const std::string until = options.values.contains("until") ? options.values.at("until") : "of the live page";
   const std::string doubt = result.predicted ? result.predicted->doubt : "";
   if (!doubt.empty() && result.until_reached.value_or(false))
-    fmt::print(stderr, "warning: --until {} was reached, but the predicted error is unreliable: {}\n",
-               options.values.at("until"), doubt);
+    fmt::print(stderr, "warning: --until {} was reached, but the predicted error is unreliable: {}\n", until, doubt);
   if (!result.until_reached.value_or(true))
     throw Unfinished(
         kTargetMissed,
         fmt::format(
             "--until {} was not reached: '{}' has a predicted relMSE of {:.3g}{} after {:.4g} samples per "
             "pixel{}",
-            options.values.at("until"), options.request().output, result.predicted->relmse,
+            until, options.request().output, result.predicted->relmse,
             options.request().until_in_blocks ? fmt::format(", {:.3g} in blocks,", result.predicted_blocks) : "",
             result.samples_per_pixel(), doubt.empty() ? "" : "; that is unreliable: " + doubt));
   if (std::any_of(result.passes.begin(), result.passes.end(), [](const Pass& p) { return p.misses_error; }))
     throw Unfinished(kTargetMissed,
                      fmt::format("--until {} was not reached: '{}' has {:.4g} samples per pixel, as many as --spp, "
                                  "--time and --max-spp allow, and some pixels need more",
-                                 options.values.at("until"), options.request().output, result.samples_per_pixel()));
+                                 until, options.request().output, result.samples_per_pixel()));
 }
 
 Outputs files_of(const RenderOptions& options) {
@@ -198,8 +201,36 @@ void warn_of_scene(const RenderOptions& options, const LoadedScene& scene) {
 
 namespace {
 
+/// Tells the page, if there is one, how the render has ended, whatever ends it.
+struct PageEnd {
+  LiveRender* live;
+  std::string text = "The render has failed; its terminal says why.";
+  ~PageEnd() {
+    if (live) live->end(text);
+  }
+};
+
+/// Reports, and returns how far an image is from what was asked for if it is complete nevertheless. A render that was
+/// ended on its page has succeeded.
+std::optional<Unfinished> report_with_page(const RenderReport& of, const StopFlag& stop, PageEnd& page) {
+  page.text = fmt::format("'{}' is complete.", of.options.request().output);
+  try {
+    report(of, stop);
+  } catch (const Unfinished& unfinished) {
+    page.text = unfinished.what();
+    if (unfinished.exit_code() == kTargetMissed) return unfinished;
+    if (!page.live || !page.live->stopped_here()) throw;
+    page.text = "stopped" + page.text.substr(std::min(page.text.find(' '), page.text.size()));
+    fmt::print(stderr, "{}\n", page.text);
+  }
+  if (stop.is_set() && !(page.live && page.live->stopped_here()))
+    throw Unfinished(stop.exit_code(), fmt::format("interrupted when '{}' was written", of.options.request().output));
+  return std::nullopt;
+}
+
 void render(RenderOptions options) {
   check_options(options);
+  check_live(options);
   const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
   if (options.sequence.is_sequence() && !options.is_replay()) return render_sequence(options, threads);
@@ -207,6 +238,8 @@ void render(RenderOptions options) {
 
   Outputs outputs = files_of(options);
   const std::unique_ptr<Display> display = display_of(options);
+  const std::unique_ptr<LiveRender> live = live_of(options);
+  PageEnd page{live.get()};
   ProgressLine progress(std::filesystem::path(options.scene).stem().string(), options.quiet);
   progress.begin("loading");
   const Stopwatch load_watch;
@@ -222,16 +255,9 @@ void render(RenderOptions options) {
   }
   std::optional<StopFlag> stop(std::in_place);
   const RenderResult result =
-      render_watched(options, scene, make_request(options, scene), display.get(), progress, *stop);
-  std::optional<Unfinished> missed;
-  try {
-    report({options, scene, result, load_seconds, threads}, *stop);
-  } catch (const Unfinished& unfinished) {
-    if (unfinished.exit_code() != kTargetMissed) throw;
-    missed = unfinished;  // the image is complete, only not as good as asked
-  }
-  if (stop->is_set())
-    throw Unfinished(stop->exit_code(), fmt::format("interrupted when '{}' was written", options.request().output));
+      render_watched(options, scene, make_request(options, scene), display.get(), progress, *stop, live.get());
+  const std::optional<Unfinished> missed =
+      report_with_page({options, scene, result, load_seconds, threads}, *stop, page);
   stop.reset();  // there is nothing more to save
   if (result.complete) write_stages(options, result);
   if (missed) throw *missed;

@@ -129,6 +129,7 @@ void add_output_options(CLI::App& command, RenderOptions& o) {
   command.option_defaults()->group("Output");
   add_value(command, "--display-server", o.display_server, kServerValue,
             "Show the image in a running tev while rendering");
+  add_live_options(command, o.live, "Show the image, its error and the time left in the browser while rendering");
   add_stages_option(command, o.stages);
   add_value(command, "--replay", o.replay, "X,Y,SAMPLE[,PASS]|light,PATH",
             "Instead of rendering, print one sample of each film, or what a light path adds");

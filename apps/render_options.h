@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "declared_options.h"
+#include "live_options.h"
 #include "plans/render_settings.h"
 #include "sequences/sequence_settings.h"
 
@@ -19,6 +20,7 @@ struct RenderOptions {
   RenderSettings settings;                                        ///< the meaning of `values`, by check_options()
   SequenceSettings sequence;                                      ///< the same of `of_sequence`
   SceneOptions scene_options;
+  LiveOptions live;
   int threads = 0;
   bool quiet = false;
 

@@ -8,6 +8,7 @@
 #include "film/display.h"
 #include "film/outputs.h"
 #include "interruption.h"
+#include "live/live_render.h"
 #include "plans/render.h"
 #include "progress.h"
 #include "render_options.h"
@@ -57,9 +58,9 @@ std::unique_ptr<Display> display_of(const RenderOptions& options);
 /// Warnings and a note on stderr.
 void warn_of_scene(const RenderOptions& options, const LoadedScene& scene);
 
-/// Renders with a progress line and, if requested, a viewer.
+/// Renders with a progress line and, if requested, a viewer and a page.
 RenderResult render_watched(const RenderOptions& options, const LoadedScene& scene, const RenderRequest& request,
-                            Display* display, ProgressLine& progress, const StopFlag& stop);
+                            Display* display, ProgressLine& progress, const StopFlag& stop, LiveRender* live = nullptr);
 
 /// Writes --json and prints the summary. Throws Unfinished for a render that was interrupted or missed its target.
 void report(const RenderReport& report, const StopFlag& stop);

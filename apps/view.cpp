@@ -2,8 +2,6 @@
 // covary view: an HTML page that compares images, opened in the browser or written to a file.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <spawn.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -18,6 +16,7 @@
 #include <optional>
 #include <vector>
 
+#include "browser.h"
 #include "commands.h"
 #include "comparison_warnings.h"
 #include "core/error.h"
@@ -26,6 +25,7 @@
 #include "film/image_file.h"
 #include "film/outputs.h"
 #include "frame_files.h"
+#include "live.h"
 #include "metrics/alignment.h"
 #include "metrics/metrics.h"
 #include "numbers.h"
@@ -34,8 +34,6 @@
 #include "risk/predicted_error.h"
 #include "sequences/frame_names.h"
 #include "value_names.h"
-
-extern char** environ;
 
 namespace covary {
 namespace {
@@ -50,6 +48,7 @@ struct ViewOptions {
   PictureChoice choice;
   double fps = 24;
   bool small = false;
+  LiveOptions live;
 
   bool is_sequence() const { return is_frame_pattern_of_input(images[0]); }
 };
@@ -325,17 +324,6 @@ std::string temporary_page() {
   return path;
 }
 
-/// Asks the desktop to open the file; false if there is no desktop.
-bool open_in_browser(const std::string& path) {
-  if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) return false;
-  std::string program = "xdg-open", argument = path;
-  char* arguments[] = {program.data(), argument.data(), nullptr};
-  pid_t child = 0;
-  int status = 0;
-  return posix_spawnp(&child, "xdg-open", nullptr, nullptr, arguments, environ) == 0 &&
-         waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
-}
-
 /// Throws Error(kUsage) if only some of the images are frames.
 void check_frames(const ViewOptions& options) {
   for (const std::string& path : options.images)
@@ -347,6 +335,11 @@ void check_frames(const ViewOptions& options) {
 }
 
 void view(const ViewOptions& options) {
+  if (options.live.wanted()) {
+    if (options.images.size() != 1 || !options.reference.empty() || !options.output.empty())
+      throw Error(ErrorCode::kUsage, "--live follows one file or folder, and writes no page");
+    return follow(options.live, options.images[0]);
+  }
   check_frames(options);
   Outputs outputs;
   std::vector<std::string> read = options.images;
@@ -389,6 +382,8 @@ void add_view(CLI::App& app) {
   command->add_flag(
       "--small", o->small,
       "Leave out FLIP and the files' other layers (StdError, Albedo, N, …): a smaller page, written faster");
+  add_live_options(*command, o->live,
+                   "Follow a file or folder while others write it: a running render, a cluster's films, frames");
   add_value(*command, "--frames", o->frames, "FIRST-LAST", "Only these frames of out_####.exr; default: all");
   command->add_option("--fps", o->fps, "Frames per second at which a sequence is played")
       ->check(positive_number())

@@ -42,6 +42,7 @@ ARROWS = {
     "passes": ["scene", "film"],
     "integrators": ["passes", "sampling"],
     "plans": ["combine", "integrators", "io"],
+    "live": ["plans", "report"],
 }
 SOURCE_FOLDERS = ["src", "include", "apps", "python", "tests", "benchmarks"]
 CPP = (".h", ".cpp", ".cu", ".cuh")

@@ -32,7 +32,7 @@ class Browser:
                    "--disable-background-networking", "--hide-scrollbars", "--force-device-scale-factor=1",
                    f"--user-data-dir={self.folder.name}/profile", "about:blank"]
         self.log = open(os.path.join(self.folder.name, "log"), "w+b")
-        self.process = subprocess.Popen(["/bin/sh", "-c", f'exec "$@" 3<&{to_browser} 4>&{from_browser}', "sh",
+        self.process = subprocess.Popen(["/bin/bash", "-c", f'exec "$@" 3<&{to_browser} 4>&{from_browser}', "bash",
                                          *command],
                                         pass_fds=(to_browser, from_browser), stdout=self.log, stderr=self.log,
                                         env={**os.environ, "TMPDIR": self.folder.name})
