@@ -1,19 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // A square image on the sphere of directions whose texels cover equal solid angles, as used by pbrt-v4's infinite
-// lights: Clarberg's octahedral mapping (2008). Texels are constant, not interpolated, like pbrt's lookups.
-//
-// With (x, y) in [-1, 1]^2 from the image's upper left corner, s = |x| + |y|, r = min(s, 2 - s) and phi = (pi / 4) (1 +
-// (|y| - |x|) / r) in the first quadrant: |z| = 1 - r^2, z >= 0 inside the diamond s <= 1, and the direction's x and y
-// have the signs of (x, y).
+// lights (core/equal_area.h). Texels are constant, not interpolated, like pbrt's lookups.
 #pragma once
 
 #include "emitters/environment_image.h"
 
 namespace covary {
-
-/// Direction of a point in the unit square, and the inverse.
-Vec3 equal_area_direction(Vec2 uv);
-Vec2 equal_area_square(const Vec3& d);
 
 /// Same interface as EnvironmentImage; the density follows the luminance of the texels.
 class EqualAreaImage {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/equal_area.h"
 #include "core/error.h"
 #include "core/random.h"
 #include "emitters/environment_image.h"

@@ -24,11 +24,18 @@ class LightParts {
   /// Adds a light's contribution to the radiance of a sample of the batch.
   void add(const Emitter& light, uint32_t sample, const Spectrum& radiance, PathContext& context) const {
     const auto found = places_.find(light.group());
-    const size_t place = found == places_.end() ? places_.size() : found->second;
-    context.by_part.radiance[sample * context.by_part.n_parts + place] += radiance;
+    add_at(found == places_.end() ? places_.size() : found->second, sample, radiance, context);
+  }
+  /// Adds light of no group.
+  void add_ungrouped(uint32_t sample, const Spectrum& radiance, PathContext& context) const {
+    add_at(places_.size(), sample, radiance, context);
   }
 
  private:
+  static void add_at(size_t place, uint32_t sample, const Spectrum& radiance, PathContext& context) {
+    context.by_part.radiance[sample * context.by_part.n_parts + place] += radiance;
+  }
+
   std::unordered_map<std::string, size_t> places_;
 };
 

@@ -60,13 +60,26 @@ inline Spectrum null_extinction(const Spectrum& majorant, const Spectrum& extinc
   return {std::max(rest.r, 0.0f), std::max(rest.g, 0.0f), std::max(rest.b, 0.0f)};
 }
 
+/// The light that a homogeneous medium emits towards the origin of a ray of this length.
+inline Spectrum emission_along(const Medium& medium, const Ray& ray, float length) {
+  const Medium::Coefficients here = medium.at(ray.o);
+  const Spectrum emission = medium.emission(ray.o, here);
+  Spectrum sum;
+  for (int c = 0; c < 3; ++c)
+    if (emission[c] > 0) sum[c] = emission[c] * -std::expm1(-here.extinction[c] * length) / here.extinction[c];
+  return sum;
+}
+
 /// Flies along `ray` up to `far`, sampling for `channel`. Returns the distance at which light scatters; infinity if it
-/// passes through, or `stop` became true.
+/// passes through, or `stop` became true. Unless it is null, an estimate of the light that the medium emits on the way
+/// is added to `glow`: exact if the medium is homogeneous, otherwise from all collisions [Novak2018].
 inline float fly(const Medium& medium, const Ray& ray, float far, int channel, FlightNumbers& numbers,
-                 SpectralWeights& weights, const std::atomic<bool>* stop) {
+                 SpectralWeights& weights, const std::atomic<bool>* stop, Spectrum* glow = nullptr) {
   float t = 0;
   if (!medium.clip(ray, t, far)) return kInfinity;
   const Spectrum& majorant = medium.majorant();
+  if (glow && medium.homogeneous())
+    *glow += weights.throughput * emission_along(medium, ray, far) * (1 / mean(weights.pdf_path));
   while (!(stop && stop->load(std::memory_order_relaxed))) {
     const float step = free_distance(majorant[channel], numbers.distance(Event::kDistance));
     if (!(t + step < far)) {
@@ -82,6 +95,9 @@ inline float fly(const Medium& medium, const Ray& ray, float far, int channel, F
     const Medium::Coefficients medium_here = medium.at(ray.at(t));
     const float u = numbers.collision();
     const Spectrum& extinction = medium_here.extinction;
+    if (glow && !medium.homogeneous())
+      *glow += weights.throughput * through * medium.emission(ray.at(t), medium_here) *
+               (1 / mean(weights.pdf_path * through * majorant));
     if (medium.homogeneous() || u * majorant[channel] < extinction[channel]) {
       const float pdf = 1 / (through[channel] * extinction[channel]);
       weights.throughput *= through * medium_here.scattering * pdf;

@@ -40,7 +40,10 @@ bool MediumPath::advance() {
   if (context_.stopped()) return false;
   if (medium_) {
     const float far = found ? hit.t : ray_.t_max;
-    const float t = fly(*medium_, ray_, far, channel_, numbers_, weights_, context_.stop);
+    Spectrum glow;
+    const bool glows = medium_->emits() && depth_ + 1 >= lengths_.min_depth;
+    const float t = fly(*medium_, ray_, far, channel_, numbers_, weights_, context_.stop, glows ? &glow : nullptr);
+    if (glows) add_glow(glow);
     if (t < kInfinity) return scatter_in_medium(ray_.at(t));
   }
   if (!found) {

@@ -43,6 +43,11 @@ class MediumPath {
     sample_.radiance += radiance;
     if (parts_) parts_->add(light, number_, radiance, context_);
   }
+  /// The light of media belongs to no group.
+  void add_glow(const Spectrum& radiance) {
+    sample_.radiance += radiance;
+    if (parts_) parts_->add_ungrouped(number_, radiance, context_);
+  }
   bool light_arrives(Ray ray, const EmitterSample& light, const Medium* medium, SpectralWeights& weights);
 
   const Scene& scene_;

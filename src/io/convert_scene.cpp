@@ -38,9 +38,12 @@ std::string relative_name(const fs::path& file, const fs::path& folder) {
 /// A parameter that Mitsuba's plugin of the same name lacks; empty if there is none.
 std::string own_parameter(const ObjectDescription& object) {
   static constexpr std::pair<const char*, const char*> kOwn[] = {
-      {"spot", "falloff"},        {"hdrfilm", "response"}, {"bitmap", "gamma"},   {"checkerboard", "dimension"},
-      {"area", "two_sided"},      {"area", "power"},       {"scale", "exponent"}, {"projector", "constant_intensity"},
-      {"roughplastic", "alpha_u"}};
+      {"spot", "falloff"},           {"hdrfilm", "response"},
+      {"bitmap", "gamma"},           {"checkerboard", "dimension"},
+      {"area", "two_sided"},         {"area", "power"},
+      {"scale", "exponent"},         {"projector", "constant_intensity"},
+      {"roughplastic", "alpha_u"},   {"homogeneous", "radiance"},
+      {"heterogeneous", "radiance"}, {"normalmap", "along_dv"}};
   const auto has = [&](const std::string& name) {
     return std::any_of(object.properties.begin(), object.properties.end(),
                        [&](const Property& p) { return p.name == name; });
@@ -58,11 +61,10 @@ void warn_of_own_plugins(const ObjectDescription& scene, std::vector<std::string
     if (!child || !*child) return;
     const ObjectDescription& object = **child;
     static const std::set<std::pair<std::string, std::string>> kOwn = {
-        {"texture", "bilerp"},      {"texture", "dots"},   {"texture", "mix"},
-        {"texture", "noise"},       {"texture", "scale"},  {"texture", "projected"},
-        {"integrator", "bdpt"},     {"bsdf", "difftrans"}, {"bsdf", "metallicroughness"},
-        {"emitter", "goniometric"}, {"bsdf", "coating"},   {"bsdf", "phong"},
-        {"bsdf", "roughcoating"},   {"bsdf", "ward"}};
+        {"texture", "bilerp"},         {"texture", "dots"},        {"texture", "mix"},     {"texture", "noise"},
+        {"texture", "scale"},          {"texture", "projected"},   {"integrator", "bdpt"}, {"bsdf", "difftrans"},
+        {"bsdf", "metallicroughness"}, {"emitter", "goniometric"}, {"bsdf", "coating"},    {"bsdf", "phong"},
+        {"bsdf", "roughcoating"},      {"bsdf", "ward"},           {"sensor", "spherical"}};
     const bool own = kOwn.contains({object.kind, object.type});
     if (const std::string name = own_parameter(object); !name.empty() && told.insert(name).second)
       warnings.push_back(fmt::format("{}: the {} '{}' gets the parameter '{}', which Mitsuba 3 does not have",

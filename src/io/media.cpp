@@ -38,12 +38,14 @@ void use_media(const ShapeMedia& media, Parameters& parameters, Shape& shape, bo
   if (no_bsdf)
     parameters.warn("has a medium and no bsdf, so it is diffuse, as in Mitsuba; <bsdf type=\"null\"/> lets light in");
   if (parts.first_medium.empty()) parts.first_medium = place_of_medium(parameters.object());
+  for (const MediumPtr& medium : {media.interior, media.exterior}) parts.media_emit |= medium && medium->emits();
   shape.set_media(media.interior, media.exterior);
 }
 
 void use_camera_medium(const MediumPtr& medium, const ObjectDescription& sensor, SceneParts& parts) {
   parts.camera_medium = medium;
   if (parts.first_medium.empty()) parts.first_medium = place_of_medium(sensor);
+  parts.media_emit |= medium && medium->emits();
 }
 
 }  // namespace covary

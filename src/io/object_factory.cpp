@@ -31,7 +31,7 @@ std::span<const Plugin<SceneObject>> setting_plugins(const std::string& kind) {
       {"independent", kSampler}, {"halton", kSampler},     {"hammersley", kSampler}, {"ldsampler", kSampler},
       {"multijitter", kSampler}, {"orthogonal", kSampler}, {"sobol", kSampler},      {"stratified", kSampler}};
   static const Plugin<SceneObject> kSensors[] = {
-      {"orthographic", kSensor}, {"perspective", kSensor}, {"thinlens", kSensor}};
+      {"orthographic", kSensor}, {"perspective", kSensor}, {"spherical", kSensor}, {"thinlens", kSensor}};
   if (kind == "rfilter") return kFilters;
   if (kind == "film") return kFilms;
   if (kind == "sampler") return kSamplers;

@@ -364,7 +364,7 @@ LightSource "projection"
            "scene.pbrt:11:1: no material has the name 'gold'",
            "scene.pbrt:12:16: parameter 'radius' of Shape \"sphere\" has the type 'rgb'; expected 'float'",
            "scene.pbrt:13:1: no object before this one has the name 'tree'",
-           "scene.pbrt:14:1: Texture \"spectrum\" \"ptex\" is not supported; supported: textures 'bilerp'",
+           "scene.pbrt:14:1: Texture \"spectrum\" \"ptex\" has colours for each face of its mesh (Ptex)",
            "no.ply",
            "scene.pbrt:18:1: MakeNamedMedium \"smoke\" is of the type 'vapour'; supported: 'cloud'",
            "scene.pbrt:21:1: no medium has the name 'mist'",

@@ -139,6 +139,19 @@ TEST_F(Pbrt3, ShapesOfVersion3AreRead) {
   EXPECT_NEAR(height("Shape \"hyperboloid\" \"point p1\" [ 1 0 0 ] \"point p2\" [ 1 1 1 ]\n", 1.118f, 0), 0.5f, 5e-3f);
   EXPECT_NEAR(height("Shape \"heightfield\" \"integer nu\" 2 \"integer nv\" 2 \"float Pz\" [ 0 1 0 1 ]\n", 0.25f, 0.5f),
               0.25f, 1e-5f);
+  // A quarter of a cylinder, by weights exactly: u along the arc from (1, 0, 0) to (0, 0, 1), v along y.
+  EXPECT_NEAR(
+      height("Shape \"nurbs\" \"integer nu\" 3 \"integer nv\" 2 \"integer uorder\" 3 \"integer vorder\" 2 "
+             "\"float uknots\" [ 0 0 0 1 1 1 ] \"float vknots\" [ 0 0 1 1 ] \"float Pw\" [ 1 0 0 1  .70710678 0 "
+             ".70710678 .70710678  0 0 1 1  1 2 0 1  .70710678 1.41421356 .70710678 .70710678  0 2 1 1 ]\n",
+             0.6f, 1),
+      0.8f, 1e-3f);
+  EXPECT_NEAR(
+      height("Shape \"nurbs\" \"integer nu\" 2 \"integer nv\" 2 \"integer uorder\" 2 \"integer vorder\" 2 "
+             "\"float uknots\" [ 0 0 1 1 ] \"float vknots\" [ 0 0 1 1 ] \"point P\" [ 0 0 0  1 0 1  0 1 0  1 1 3 "
+             "]\n",
+             0.5f, 0.5f),
+      1, 1e-3f);
 }
 
 }  // namespace

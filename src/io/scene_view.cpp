@@ -49,6 +49,7 @@ ObjectPtr child_of(const ObjectDescription* parent, const std::string& kind) {
 
 /// Whether lights other than `weak` ones shine on the scene.
 bool has_light(const SceneParts& parts, const Bounds3& bounds, bool weak_lights) {
+  if (parts.media_emit) return true;
   if (!weak_lights) return !parts.emitters.empty();
   for (const ShapePtr& shape : parts.shapes)
     if (auto* mesh = dynamic_cast<TriangleMesh*>(shape.get()); mesh && mesh->emitter()) mesh->prepare_sampling();

@@ -101,7 +101,13 @@ std::shared_ptr<SensorSettings> make_sensor(Parameters& p) {
   sensor->to_world = p.find_animation("to_world");
   camera.to_world = sensor->to_world ? sensor->to_world->at(sensor->shutter_open) : p.get_transform("to_world");
   camera.orthographic = p.type() == "orthographic";
-  if (!camera.orthographic) {
+  const bool spherical = p.type() == "spherical", framed = !camera.orthographic && !spherical;
+  if (spherical)
+    camera.panorama =
+        p.get_choice("mapping", "latitude_longitude", {"equal_area", "latitude_longitude"}) == "equal_area"
+            ? Panorama::kEqualArea
+            : Panorama::kLatitudeLongitude;
+  if (framed) {
     const FieldOfView view = get_field_of_view(p);
     camera.fov_degrees = view.degrees, camera.fov_axis = view.axis;
   }
@@ -110,13 +116,13 @@ std::shared_ptr<SensorSettings> make_sensor(Parameters& p) {
   if (!(camera.near_clip > 0 && camera.near_clip < camera.far_clip))
     p.error(fmt::format("near_clip is {} and far_clip {}; expected 0 < near_clip < far_clip", camera.near_clip,
                         camera.far_clip));
-  if (!camera.orthographic) camera.focus_distance = p.get_float("focus_distance", camera.far_clip, 0, kHuge);
+  if (framed) camera.focus_distance = p.get_float("focus_distance", camera.far_clip, 0, kHuge);
   if (p.type() == "thinlens") {
     if (!p.has("aperture_radius")) p.error("the float 'aperture_radius' is missing");
     camera.aperture_radius = p.get_float("aperture_radius", 0, 0, kHuge);
     if (!(camera.focus_distance > 0)) p.error_at("focus_distance", "is 0; it must be positive");
   }
-  if (!camera.orthographic) {
+  if (framed) {
     camera.principal_point_offset = {p.get_float("principal_point_offset_x", 0),
                                      p.get_float("principal_point_offset_y", 0)};
   }

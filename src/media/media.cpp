@@ -7,6 +7,8 @@
 // | albedo         | colour/volume | 0.75    | fraction of it that is scattering, in [0, 1]                       |
 // | sigma_a, sigma_s | colour      |         | absorption and scattering, instead of sigma_t and albedo           |
 // | scale          | float         | 1       | factor on sigma_t                                                  |
+// | radiance       | colour/volume | 0       | emitted per absorbed fraction: sigma_t (1 - albedo) scale radiance |
+// |                |               |         | per unit of length                                                 |
 // | sample_emitters | boolean      | true    | whether points in the medium sample lights                         |
 // | has_spectral_extinction | boolean |       | accepted, no effect                                                |
 // | (nested)       | phase         | isotropic |                                                                  |
@@ -72,11 +74,28 @@ void read_coefficients(Parameters& p, MediumSettings& settings) {
   settings.albedo = std::make_shared<ConstantVolume>(albedo);
 }
 
+void read_radiance(Parameters& p, MediumSettings& settings) {
+  if (!p.has("radiance")) return;
+  if (p.holds_object("radiance")) {
+    settings.radiance = std::dynamic_pointer_cast<const Volume>(p.find_object("radiance", "volume"));
+    if (settings.homogeneous && settings.radiance && !settings.radiance->is_constant())
+      p.error_at("radiance", "varies; a medium of varying radiance is a medium 'heterogeneous'");
+  } else {
+    settings.radiance =
+        std::make_shared<ConstantVolume>(p.get_spectrum("radiance", Spectrum(0), SpectrumRole::kEmission));
+  }
+  if (!settings.radiance) return;  // reported
+  if (!not_negative(settings.radiance->smallest()) || !not_negative(settings.radiance->largest()))
+    p.error_at("radiance", "has values that are negative or not finite");
+  if (is_black(settings.radiance->largest())) settings.radiance = nullptr;
+}
+
 std::shared_ptr<Medium> make_medium(Parameters& p, bool homogeneous) {
   MediumSettings settings;
   settings.homogeneous = homogeneous;
   read_coefficients(p, settings);
   settings.scale = p.get_float("scale", 1, 0);
+  read_radiance(p, settings);
   settings.sample_lights = p.get_bool("sample_emitters", true);
   p.get_bool("has_spectral_extinction", true);
   const auto phases = p.children<PhaseFunction>("phase");

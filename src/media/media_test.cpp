@@ -32,6 +32,20 @@ TEST(Media, ScaleIsAFactorOnTheExtinction) {
   EXPECT_EQ(medium->at({}).scattering, Spectrum(2, 2, 0));
 }
 
+TEST(Media, GlowIsProportionalToAbsorption) {
+  EXPECT_FALSE(make("homogeneous", {}).object->emits());
+  EXPECT_FALSE(make("homogeneous", {{"radiance", 0.0}}).object->emits());
+  const auto medium = make("homogeneous", {{"sigma_t", 1.0},
+                                           {"albedo", ColourValue{{0, 0.5f, 1}}},
+                                           {"scale", 2.0},
+                                           {"radiance", ColourValue{{3, 2, 1}}}})
+                          .object;
+  ASSERT_TRUE(medium->emits());
+  EXPECT_EQ(medium->emission({}, medium->at({})), Spectrum(6, 2, 0));
+  EXPECT_TRUE(contains(make("homogeneous", {{"radiance", ColourValue{{-1, 0, 0}}}}).errors,
+                       "has values that are negative or not finite"));
+}
+
 TEST(Media, OneWithoutBoundsIsNotCut) {
   float near = 0, far = 7;
   EXPECT_TRUE(make("homogeneous", {}).object->clip({{5, 5, 5}, {1, 0, 0}}, near, far));

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <map>
 
 #include "core/perlin_noise.h"
 #include "pbrt/pbrt_nanovdb.h"
@@ -14,6 +15,8 @@
 
 namespace covary {
 namespace {
+
+constexpr double kYIntegral = 106.856895;  // of the CIE's y over nanometres
 
 struct Coefficients {
   Spectrum absorbed, scattered;  ///< per unit length, before scale
@@ -51,21 +54,11 @@ void set_phase(PbrtParameters& p, ObjectDescription& medium) {
   set_property(medium, "", ObjectPtr(phase));
 }
 
-/// Media emit no light here.
-void tell_glow(PbrtParameters& p) {
-  const PbrtParameter *glow = p.find("Le"), *scale = p.find("Lescale");
-  const auto positive = [](const PbrtParameter* parameter) {
-    return parameter &&
-           (!parameter->strings.empty() || std::ranges::any_of(parameter->numbers, [](double x) { return x > 0; }));
-  };
-  p.ignore({"LeScale", "temperature", "temperaturescale", "temperatureoffset", "temperaturecutoff"});
-  if ((positive(glow) && (!scale || positive(scale))) || p.has("temperature"))
-    p.warn("glows in pbrt; here media emit no light, which the picture lacks");
-}
+/// What the medium emits per unit that it absorbs.
+void set_glow(ObjectDescription& medium, Value radiance) { set_property(medium, "radiance", std::move(radiance)); }
 
 ObjectBuilder homogeneous(PbrtParameters& p, PbrtNames& names) {
   const auto given = coefficients(p, names);
-  tell_glow(p);
   if (!given) return nullptr;
   Spectrum extinction = given->absorbed + given->scattered;
   // Mitsuba accepts no extinction colour above 1.
@@ -76,6 +69,9 @@ ObjectBuilder homogeneous(PbrtParameters& p, PbrtNames& names) {
                              {"albedo", ColourValue{albedo_of(*given)}},
                              {"scale", p.get_float("scale", 1) * unit}});
   set_phase(p, *medium);
+  if (!names.version_3 && p.has("Le"))
+    set_glow(*medium, ColourValue{light_colour(p, "Le", names) *
+                                  static_cast<float>(p.get_float("Lescale", 1) * names.exposure)});
   return medium;
 }
 
@@ -145,6 +141,65 @@ std::vector<float> cells(PbrtParameters& p, const char* name, const char* type, 
   return values;
 }
 
+/// A black body's light is that of its spectrum of maximum 1, in pbrt's units: white light of radiance 1 has a
+/// luminance of 1 / ∫ y there.
+Spectrum glow_of(double temperature) {
+  return temperature > 100
+             ? spectrum_to_rgb(pbrt_blackbody(temperature), SpectrumRole::kEmission) * static_cast<float>(kYIntegral)
+             : Spectrum();
+}
+
+/// The glow of cells of these temperatures, whatever their unit. Between cells, light is interpolated.
+ObjectPtr glow_of_temperatures(PbrtParameters& p, const Grid& grid, const std::vector<float>& temperatures,
+                               const std::vector<float>& factors, const Transform& box, double exposure) {
+  const double offset = p.get_float("temperatureoffset", p.get_float("temperaturecutoff", 0)),
+               scale = p.get_float("temperaturescale", 1);
+  std::map<int64_t, Spectrum> known;  // by kelvins
+  std::vector<float> glow;
+  float most = 0;
+  for (size_t i = 0; i < temperatures.size(); ++i) {
+    const double kelvins = std::clamp((temperatures[i] - offset) * scale, 0.0, 1e6);
+    const auto [found, is_new] = known.try_emplace(std::llround(kelvins));
+    if (is_new) found->second = glow_of(static_cast<double>(found->first));
+    const float factor = factors.size() == 1 ? factors[0] : factors[i];
+    for (int c = 0; c < 3; ++c) {
+      glow.push_back(found->second[c] * factor * static_cast<float>(exposure));
+      most = std::max(most, glow.back());
+    }
+  }
+  return most > 0 ? grid_volume(p, grid, glow, 3, box) : nullptr;
+}
+
+/// Sets `Le` times the grid or number `Lescale`, or the black bodies of `temperature`.
+bool set_grid_glow(PbrtParameters& p, const Grid& grid, const Transform& box, PbrtNames& names,
+                   ObjectDescription& medium) {
+  std::vector<float> factors = {1};
+  if (p.has("Lescale")) {
+    factors = cells(p, "Lescale", "float", 1, grid);
+    if (factors.empty()) return false;
+  }
+  if (p.has("temperature")) {
+    if (p.has("Le")) p.error("has both 'Le' and 'temperature'; pbrt allows one of them");
+    const std::vector<float> temperatures = cells(p, "temperature", "float", 1, grid);
+    if (temperatures.empty()) return false;
+    if (const ObjectPtr glow = glow_of_temperatures(p, grid, temperatures, factors, box, names.exposure))
+      set_glow(medium, glow);
+    return true;
+  }
+  p.ignore({"temperaturescale", "temperatureoffset", "temperaturecutoff"});
+  if (!p.has("Le")) return true;
+  const Spectrum colour = light_colour(p, "Le", names) * static_cast<float>(names.exposure);
+  if (factors.size() == 1) {
+    set_glow(medium, ColourValue{colour});
+    return true;
+  }
+  std::vector<float> glow;
+  for (const float factor : factors)
+    for (int c = 0; c < 3; ++c) glow.push_back(factor * colour[c]);
+  set_glow(medium, grid_volume(p, grid, glow, 3, box));
+  return true;
+}
+
 /// A density in [0, …) times constant coefficients.
 ObjectBuilder of_density(PbrtParameters& p, const Grid& grid, const std::vector<float>& density, const Transform& box,
                          PbrtNames& names) {
@@ -167,17 +222,19 @@ ObjectBuilder uniform_grid(PbrtParameters& p, const Transform& to_world, PbrtNam
   const auto grid = read_size(p);
   if (!grid) return nullptr;
   const std::vector<float> density = cells(p, "density", "float", 1, *grid);
-  tell_glow(p);
-  return density.empty() ? nullptr : of_density(p, *grid, density, box_of(p, to_world), names);
+  if (density.empty()) return nullptr;
+  const Transform box = box_of(p, to_world);
+  const ObjectBuilder medium = of_density(p, *grid, density, box, names);
+  if (names.version_3) return medium;
+  return medium && set_grid_glow(p, *grid, box, names, *medium) ? medium : nullptr;
 }
 
-ObjectBuilder rgb_grid(PbrtParameters& p, const Transform& to_world) {
+ObjectBuilder rgb_grid(PbrtParameters& p, const Transform& to_world, const PbrtNames& names) {
   const auto grid = read_size(p);
   if (!grid) return nullptr;
   std::vector<float> absorbed(3 * grid->n_cells(), 1.0f), scattered = absorbed;
   if (p.has("sigma_a")) absorbed = cells(p, "sigma_a", "rgb", 3, *grid);
   if (p.has("sigma_s")) scattered = cells(p, "sigma_s", "rgb", 3, *grid);
-  tell_glow(p);
   if (absorbed.empty() || scattered.empty()) return nullptr;
   const Transform box = box_of(p, to_world);
   std::vector<float> extinction(absorbed.size()), albedo(absorbed.size());
@@ -190,6 +247,13 @@ ObjectBuilder rgb_grid(PbrtParameters& p, const Transform& to_world) {
                              {"albedo", grid_volume(p, *grid, albedo, 3, box)},
                              {"scale", p.get_float("scale", 1)}});
   set_phase(p, *medium);
+  if (!p.has("Le")) return medium;
+  // Unlike that of lights, this light is not relative to that of white.
+  const auto scale = static_cast<float>(p.get_float("Lescale", 1) * kYIntegral * names.exposure);
+  std::vector<float> glow = cells(p, "Le", "rgb", 3, *grid);
+  for (float& value : glow) value *= scale;
+  if (glow.empty()) return nullptr;
+  set_glow(*medium, grid_volume(p, *grid, glow, 3, box));
   return medium;
 }
 
@@ -245,11 +309,15 @@ ObjectBuilder nanovdb(PbrtParameters& p, const Transform& to_world, PbrtNames& n
       return nullptr;
     }
     if (density->step > 1) p.warn(fmt::format("is sampled at every {}th of its voxels", density->step));
-    if (read_nanovdb(path, temperature_name, &*density) || p.has("Le"))
-      p.warn("glows in pbrt; here media emit no light, which the picture lacks");
     const Grid grid{{density->size[0], density->size[1], density->size[2]}};
-    p.ignore({"Le", "Lescale", "LeScale", "temperaturescale", "temperatureoffset", "temperaturecutoff"});
-    return of_density(p, grid, density->values, to_world * density->box, names);
+    const Transform box = to_world * density->box;
+    const ObjectBuilder medium = of_density(p, grid, density->values, box, names);
+    if (const auto temperature = read_nanovdb(path, temperature_name, &*density); temperature && medium)
+      if (const ObjectPtr glow = glow_of_temperatures(
+              p, grid, temperature->values, {static_cast<float>(p.get_float("Lescale", 1))}, box, names.exposure))
+        set_glow(*medium, glow);
+    p.ignore({"Le", "Lescale", "temperaturescale", "temperatureoffset", "temperaturecutoff"});
+    return medium;
   } catch (const Error& error) {
     p.error(fmt::format("cannot be used: {}", error.what()));
     return nullptr;
@@ -260,9 +328,10 @@ ObjectBuilder nanovdb(PbrtParameters& p, const Transform& to_world, PbrtNames& n
 
 ObjectBuilder make_pbrt_medium(const std::string& type, PbrtParameters& p, const Transform& to_world,
                                PbrtNames& names) {
+  p.rename("LeScale", "Lescale");
   if (type == "homogeneous") return homogeneous(p, names);
   if (type == "uniformgrid" || type == "heterogeneous") return uniform_grid(p, to_world, names);
-  if (type == "rgbgrid") return rgb_grid(p, to_world);
+  if (type == "rgbgrid") return rgb_grid(p, to_world, names);
   if (type == "cloud") return cloud(p, to_world, names);
   if (type == "nanovdb") return nanovdb(p, to_world, names);
   p.error(fmt::format("is of the type '{}'; supported: 'cloud', 'homogeneous', 'nanovdb', 'rgbgrid' and 'uniformgrid'",

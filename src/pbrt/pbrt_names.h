@@ -13,7 +13,7 @@
 #include "formats/file_resolver.h"
 #include "formats/object_builder.h"
 #include "formats/scene_references.h"
-#include "pbrt/pbrt_parameters.h"
+#include "pbrt_text/pbrt_parameters.h"
 
 namespace covary {
 
@@ -50,6 +50,8 @@ class PbrtNames {
   FileResolver& files() const { return files_; }
   /// The scene is of version 3, whose names and defaults differ.
   bool version_3 = false;
+  /// Values of the picture per radiance, by which all that shines is multiplied; known when the world begins.
+  double exposure = 1;
   /// The textures that pbrt looks up instead of these for a reflectance: those with images clamped to 1.
   std::map<ObjectPtr, ObjectPtr> reflectances;
 

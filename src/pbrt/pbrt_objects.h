@@ -12,8 +12,8 @@
 #include "formats/file_resolver.h"
 #include "formats/object_builder.h"
 #include "pbrt/pbrt_names.h"
-#include "pbrt/pbrt_parameters.h"
 #include "pbrt/pbrt_placement.h"
+#include "pbrt_text/pbrt_parameters.h"
 #include "scene/parameters.h"
 
 namespace covary {
@@ -96,6 +96,7 @@ PbrtShape make_pbrt_quadric(const std::string& type, PbrtParameters& p, const Pb
 PbrtShape make_pbrt_bilinear_mesh(PbrtParameters& p, const PbrtPlacement& placement);
 PbrtShape make_pbrt_subdivision(PbrtParameters& p, const PbrtPlacement& placement);
 PbrtShape make_pbrt_height_field(PbrtParameters& p, const PbrtPlacement& placement);
+PbrtShape make_pbrt_nurbs(PbrtParameters& p, const PbrtPlacement& placement);
 PbrtShape make_pbrt_curve(PbrtParameters& p, const PbrtPlacement& placement);
 /// Appends the curves of `more` to `first`, for scenes with one shape per hair; false if they are not curves.
 bool join_pbrt_curves(ObjectDescription& first, const ObjectDescription& more);
@@ -103,19 +104,25 @@ bool join_pbrt_curves(ObjectDescription& first, const ObjectDescription& more);
 /// The directives before WorldBegin, in any order.
 struct PbrtView {
   ObjectBuilder sensor, film, filter, sampler, integrator;
-  bool orthographic = false;
+  bool orthographic = false, spherical = false;
   bool without_media = false;  ///< the integrator leaves media out, as pbrt's 'path' does
   Transform camera_to_world;
   double fov = 90;  ///< of the shorter side
   double focal_distance = 0, lens_radius = 0;
+  // Of a "realistic" camera, in metres: from the rear principal plane to the film; 0: the camera is another.
+  double lens_to_film = 0, lens_offset = 0, film_diagonal = 0.035;
+  double lens_exposure = 1;  ///< irradiance of its film per radiance
   std::optional<double> frame_aspect;
   std::vector<double> screen_window;    ///< x0, x1, y0, y1 or empty
   double exposure_time = 1, iso = 100;  ///< in seconds
   bool version_3 = false;
   /// Values of the picture per radiance (pbrt's film.cpp: imagingRatio); those of version 3 are not exposed.
-  double exposure() const { return (version_3 ? 1 : exposure_time) * iso / 100; }
+  double exposure() const { return (version_3 ? 1 : exposure_time) * iso / 100 * lens_exposure; }
 };
-void read_pbrt_camera(const std::string& type, PbrtParameters& p, const Transform& world_to_camera, PbrtView& view);
+/// `files` finds the lens of a "realistic" camera.
+void read_pbrt_camera(const std::string& type, PbrtParameters& p, const Transform& world_to_camera, FileResolver& files,
+                      PbrtView& view);
+ObjectBuilder default_pbrt_camera(const SourceLocation& where);
 void read_pbrt_film(const std::string& type, PbrtParameters& p, PbrtView& view);
 void read_pbrt_filter(const std::string& type, PbrtParameters& p, PbrtView& view);
 void read_pbrt_sampler(const std::string& type, PbrtParameters& p, PbrtView& view);

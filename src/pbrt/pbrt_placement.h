@@ -6,7 +6,7 @@
 #include <string>
 
 #include "core/transform.h"
-#include "pbrt/pbrt_tokens.h"
+#include "pbrt_text/pbrt_tokens.h"
 
 namespace covary {
 

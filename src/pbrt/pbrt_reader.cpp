@@ -205,7 +205,7 @@ class Reader {
       p.error("stands behind WorldBegin");
     } else if (word == "Camera") {
       if (state_.placement.flat) p.error("has a singular transformation");
-      read_pbrt_camera(type, p, state_.placement.to_world, view_);
+      read_pbrt_camera(type, p, state_.placement.to_world, files_, view_);
       world_->camera_medium(view_.sensor, state_.outside);
       systems_["camera"] = state_.placement.to_world.inverse();
     } else {

@@ -123,11 +123,12 @@ PbrtShape make_pbrt_shape(const std::string& type, PbrtParameters& p, const Pbrt
   if (type == "bilinearmesh") return make_pbrt_bilinear_mesh(p, placement);
   if (type == "loopsubdiv") return make_pbrt_subdivision(p, placement);
   if (type == "heightfield") return make_pbrt_height_field(p, placement);
+  if (type == "nurbs") return make_pbrt_nurbs(p, placement);
   if (type == "curve") return make_pbrt_curve(p, placement);
   if (type == "plymesh") return ply_mesh(p, placement, files);
   p.error(
       "is not supported; supported: shapes 'bilinearmesh', 'curve', 'cylinder', 'disk', 'loopsubdiv', 'plymesh', "
-      "'sphere' and 'trianglemesh', and 'cone', 'heightfield', 'hyperboloid' and 'paraboloid' of version 3");
+      "'sphere' and 'trianglemesh', and 'cone', 'heightfield', 'hyperboloid', 'nurbs' and 'paraboloid' of version 3");
   return {};
 }
 

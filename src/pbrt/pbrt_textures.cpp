@@ -247,6 +247,13 @@ ObjectBuilder make_pbrt_texture(const std::string& type, PbrtParameters& p, cons
     if (!value) return nullptr;
     return make_object("texture", "uniform", p.where(), {{"value", *value}});
   }
+  if (type == "ptex") {
+    p.error(
+        "has colours for each face of its mesh (Ptex), which is not supported, and whose mean colour is not known; use "
+        "'imagemap' or 'constant' instead");
+    p.ignore_all();
+    return nullptr;
+  }
   p.error(
       "is not supported; supported: textures 'bilerp', 'checkerboard', 'constant', 'directionmix', 'dots', 'fbm', "
       "'imagemap', 'marble', 'mix', 'scale', 'windy' and 'wrinkled'");

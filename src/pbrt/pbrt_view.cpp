@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The directives before WorldBegin of pbrt: camera, film, filter, sampler, integrator.
+// The directives before WorldBegin of pbrt: film, filter, sampler, integrator, and where the camera is.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,42 +8,6 @@
 #include "pbrt/pbrt_objects.h"
 
 namespace covary {
-namespace {
-
-constexpr double kLensDistance = 1e6;  // pbrt's default focal distance
-// pbrt clips nothing. Orthographic rays start in the camera's plane.
-constexpr double kNearClip = 1e-6, kFarClip = 1e7;
-
-}  // namespace
-
-void read_pbrt_camera(const std::string& type, PbrtParameters& p, const Transform& world_to_camera, PbrtView& view) {
-  if (type != "perspective" && type != "orthographic") {
-    p.error("is not supported; supported: cameras 'orthographic' and 'perspective'");
-    p.ignore_all();
-    return;
-  }
-  view.screen_window = p.get_array("screenwindow", "float", 4);
-  if (p.has("frameaspectratio")) view.frame_aspect = p.get_float("frameaspectratio", 1);
-  view.exposure_time = p.get_float("shutterclose", 1) - p.get_float("shutteropen", 0);
-  view.lens_radius = p.get_float("lensradius", 0);
-  view.focal_distance = p.get_float("focaldistance", kLensDistance);
-  view.orthographic = type == "orthographic";
-  if (view.orthographic && view.lens_radius > 0) {
-    p.warn("has a lens and parallel rays; everything is in focus here");
-    view.lens_radius = 0;
-  }
-  view.sensor = make_object("sensor",
-                            view.orthographic      ? type
-                            : view.lens_radius > 0 ? "thinlens"
-                                                   : "perspective",
-                            p.where());
-  view.camera_to_world = world_to_camera.inverse();
-  set_property(*view.sensor, "near_clip", kNearClip);
-  set_property(*view.sensor, "far_clip", kFarClip);
-  const double half = p.get_float("halffov", -1), fov = p.get_float("fov", 90);
-  view.fov = half > 0 ? 2 * half : fov;
-}
-
 namespace {
 
 /// pbrt's picture is radiance times exposure time times ISO / 100, whatever the sensor, which changes colours: by its
@@ -112,21 +76,33 @@ void read_pbrt_film(const std::string& type, PbrtParameters& p, PbrtView& view) 
     set_property(*film, "crop_height", crop[3] - crop[2]);
   }
   read_sensor(p, *film, view);
-  p.ignore({"filename", "savefp16", "diagonal", "coordinatesystem", "nbuckets", "lambdamin", "lambdamax", "scale"});
+  view.film_diagonal = p.get_float("diagonal", 35) / 1000;
+  p.ignore({"filename", "savefp16", "coordinatesystem", "nbuckets", "lambdamin", "lambdamax", "scale"});
   view.film = film;
 }
 
 void read_pbrt_filter(const std::string& type, PbrtParameters& p, PbrtView& view) {
   p.rename("xwidth", "xradius"), p.rename("ywidth", "yradius");  // version 3
-  const double x = p.get_float("xradius", type == "box"        ? 0.5
-                                          : type == "triangle" ? 2
-                                                               : 1.5),
+  const bool sinc = type == "sinc";
+  const double x = p.get_float("xradius", type == "box"                              ? 0.5
+                                          : type == "triangle" || type == "mitchell" ? 2
+                                          : sinc                                     ? 4
+                                                                                     : 1.5),
                y = p.get_float("yradius", x);
   if (type == "box" && x == 0.5 && y == 0.5) {
     view.filter = make_object("rfilter", "box", p.where());
   } else if (type == "triangle" && x == y) {
     view.filter = make_object("rfilter", "tent", p.where());
     set_property(*view.filter, "radius", x);
+  } else if (type == "mitchell") {
+    view.filter = make_object("rfilter", "mitchell", p.where(),
+                              {{"A", p.get_float("B", 1.0 / 3)}, {"B", p.get_float("C", 1.0 / 3)}});
+    if (x != 2 || y != 2) p.warn(fmt::format("has radii of {} and {}; here it has one of 2", x, y));
+  } else if (sinc) {
+    const auto lobes = std::clamp<int64_t>(std::llround(p.get_float("tau", 3)), 1, 32);
+    view.filter = make_object("rfilter", "lanczos", p.where(), {{"lobes", lobes}});
+    if (const auto end = static_cast<double>(lobes); x > end || y > end)
+      p.warn(fmt::format("goes on to {} pixels; here it ends where its window is 0, at {}", std::max(x, y), lobes));
   } else {
     const double alpha = p.get_float("alpha", 0);  // version 3: exp(-alpha x^2)
     view.filter = make_object("rfilter", "gaussian", p.where());
@@ -228,9 +204,27 @@ void set_perspective(PbrtView& view, const Window& window, double aspect, PbrtMe
   set_property(sensor, "focus_distance", view.focal_distance);
 }
 
+/// pbrt's directions (x, y, z) are ours (z, y, -x): the film's centre looks along its -x and our z.
+void place_panorama(PbrtView& view) {
+  Matrix4 m{};
+  m[0] = {0, 0, -1, 0}, m[1] = {0, 1, 0, 0}, m[2] = {1, 0, 0, 0}, m[3] = {0, 0, 0, 1};
+  const float scale = length(view.camera_to_world.vector({0, 0, 1}));
+  set_property(*view.sensor, "to_world",
+               view.camera_to_world * Transform::scale(Vec3{1, 1, 1} * (1 / scale)) * Transform(m));
+}
+
+/// The field of view and place of a lens in front of a film with this aspect ratio.
+void place_lens(PbrtView& view, double aspect) {
+  const double shorter = view.film_diagonal / std::sqrt(1 + aspect * aspect) * std::min(aspect, 1.0);
+  view.fov = 2 * std::atan(shorter / 2 / view.lens_to_film) * 180 / M_PI;
+  view.camera_to_world = view.camera_to_world * Transform::translate({0, 0, static_cast<float>(view.lens_offset)});
+}
+
 void place_camera(PbrtView& view, PbrtMessages& messages) {
+  if (view.spherical) return place_panorama(view);
   const auto size = [&](size_t i) { return static_cast<double>(std::get<int64_t>(view.film->properties[i].value)); };
   const double aspect = size(0) / std::max(size(1), 1.0);
+  if (view.lens_to_film > 0) place_lens(view, aspect);
   const Window window = window_of(view, aspect);
   if (!(window.x > 0 && window.y > 0)) {
     messages.error(view.sensor->where, "'screenwindow' is empty; expected x0 < x1 and y0 < y1");
@@ -266,9 +260,7 @@ std::vector<ObjectPtr> finish_pbrt_view(PbrtView view, const SourceLocation& whe
     set_property(*view.sampler, "sample_count", int64_t{16});
   }
   if (!view.sensor) {
-    view.sensor = make_object("sensor", "perspective", where);
-    set_property(*view.sensor, "near_clip", kNearClip);
-    set_property(*view.sensor, "far_clip", kFarClip);
+    view.sensor = default_pbrt_camera(where);
   }
   if (!view.integrator) {
     view.integrator = make_object("integrator", "path", where);

@@ -189,6 +189,7 @@ void PbrtWorld::finish_lights(const PbrtView& view) {
 }
 
 void PbrtWorld::finish(const PbrtView& view) {
+  names_.exposure = view.exposure();
   for (const Pending& shape : pending_) finish_shape(shape, view);
   finish_lights(view);
   if (const auto& [sensor, use] = camera_; sensor && use) {

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/camera.h"
 
+#include <algorithm>
+
+#include "core/equal_area.h"
 #include "core/error.h"
 #include "core/warp.h"
 
@@ -58,6 +61,7 @@ Ray Camera::ray(Vec2 film, Vec2 lens) const {
   const float sx = film.x / static_cast<float>(width_) + settings_.principal_point_offset.x;
   const float sy = film.y / static_cast<float>(height_) + settings_.principal_point_offset.y;
   if (settings_.orthographic) return orthographic_ray(sx, sy);
+  if (is_panorama()) return panorama_ray(sx, sy);
   Vec3 d{(1 - 2 * sx) * tan_x_, (1 - 2 * sy) * tan_y_, 1};
   Vec3 o{0, 0, 0};
   if (settings_.aperture_radius > 0) {
@@ -76,7 +80,42 @@ Ray Camera::orthographic_ray(float sx, float sy) const {
   return {origin_ + on_film + z_ * settings_.near_clip, normalize(z_), settings_.far_clip - settings_.near_clip};
 }
 
+Ray Camera::panorama_ray(float sx, float sy) const {
+  Vec3 d;
+  if (settings_.panorama == Panorama::kEqualArea) {
+    // Samples of a pixel filter may lie beyond the square's edges, where the map goes on mirrored.
+    Vec2 at{sx, sy};
+    if (at.x < 0 || at.x > 1) at = {at.x < 0 ? -at.x : 2 - at.x, 1 - at.y};
+    if (at.y < 0 || at.y > 1) at = {1 - at.x, at.y < 0 ? -at.y : 2 - at.y};
+    const Vec3 on_sphere = equal_area_direction({clamp01(at.x), clamp01(at.y)});
+    d = {on_sphere.y, on_sphere.z, -on_sphere.x};
+  } else {
+    const float theta = kPi * sy, phi = kTwoPi * sx, sine = std::sin(theta);
+    d = {sine * std::sin(phi), std::cos(theta), -sine * std::cos(phi)};
+  }
+  const Vec3 world = normalize(x_ * d.x + y_ * d.y + z_ * d.z);
+  return {origin_ + world * settings_.near_clip, world, settings_.far_clip - settings_.near_clip};
+}
+
+Vec2 Camera::project_panorama(const Vec3& d) const {
+  const Vec3 local = normalize(Vec3{dot(to_x_, d), dot(to_y_, d), dot(to_z_, d)});
+  Vec2 at;
+  if (settings_.panorama == Panorama::kEqualArea) {
+    at = equal_area_square({-local.z, local.x, local.y});
+  } else {
+    const float phi = std::atan2(local.x, -local.z);
+    at = {(phi < 0 ? phi + kTwoPi : phi) / kTwoPi, std::acos(std::clamp(local.y, -1.0f, 1.0f)) * kInvPi};
+  }
+  return {at.x * static_cast<float>(width_), at.y * static_cast<float>(height_)};
+}
+
 float Camera::pdf_direction(const Vec3& d) const {
+  if (is_panorama()) {
+    const float pixels = static_cast<float>(width_) * static_cast<float>(height_);
+    if (settings_.panorama == Panorama::kEqualArea) return pixels / (4 * kPi);
+    const float sine = std::max(std::sqrt(std::max(1 - sqr(dot(to_y_, d)), 0.0f)), 1e-4f);
+    return pixels / (2 * sqr(kPi) * sine);
+  }
   // The ray meets the image plane at d / z, where an area covers the solid angle area * z^3 (for skewed axes, times
   // their volume).
   const float z = dot(to_z_, d);
@@ -85,10 +124,12 @@ float Camera::pdf_direction(const Vec3& d) const {
 
 float Camera::importance(const Vec3& d) const {
   const float pdf = pdf_direction(d);
+  if (is_panorama()) return pdf;  // the pinhole faces each direction
   return pdf > 0 ? pdf * pdf_position_ / dot(lens_normal_, d) : 0;
 }
 
 Vec2 Camera::project(const Vec3& p, const Vec3& d) const {
+  if (is_panorama()) return project_panorama(d);
   const float inverse_z = 1 / dot(to_z_, d);
   float x = dot(to_x_, d) * inverse_z, y = dot(to_y_, d) * inverse_z;
   if (!is_delta()) {
@@ -105,7 +146,7 @@ Vec2 Camera::project(const Vec3& p, const Vec3& d) const {
 
 LensSample Camera::sample_towards(const Vec3& reference, Vec2 u) const {
   LensSample sample;
-  const float z = dot(to_z_, reference - origin_);
+  const float z = is_panorama() ? length(reference - origin_) : dot(to_z_, reference - origin_);
   if (!(z > settings_.near_clip && z < settings_.far_clip)) return sample;
   sample.p = origin_;
   if (!is_delta()) {

@@ -16,11 +16,18 @@ enum class FovAxis { kX, kY, kDiagonal, kSmaller, kLarger };
 /// Half the extent along x at distance 1 of an image with this field of view; `aspect`: width over height.
 float half_extent_x(float fov_degrees, FovAxis axis, float aspect);
 
-/// Perspective camera with a pinhole or a thin lens, or orthographic camera.
+/// Maps from the film to all directions. In the camera's space, x to the left, y up, the film's centre looks along z:
+///   kLatitudeLongitude   (sin t sin p, cos t, -sin t cos p) with t = pi y and p = 2 pi x, (x, y) in [0, 1]^2 from the
+///                        film's upper left corner, as Mitsuba 0.x's sensor `spherical` and pbrt's
+///   kEqualArea           (b, c, -a) of (a, b, c) = equal_area_direction(x, y), as pbrt-v4's
+enum class Panorama { kNone, kLatitudeLongitude, kEqualArea };
+
+/// Perspective camera with a pinhole or a thin lens, orthographic camera, or one that looks in all directions.
 struct CameraSettings {
   Transform to_world;
   bool orthographic = false;  ///< parallel rays along z from [-1, 1]^2, its height scaled by the film's aspect
-  float fov_degrees = 50;     ///< full angle, in (0, 180)
+  Panorama panorama = Panorama::kNone;  ///< else, a pinhole that sees all directions; clip distances are those to it
+  float fov_degrees = 50;               ///< full angle, in (0, 180)
   FovAxis fov_axis = FovAxis::kX;
   float near_clip = 1e-2f, far_clip = 1e4f;  ///< distances along the viewing axis
   Vec2 principal_point_offset{0, 0};         ///< relative to the film's size
@@ -59,6 +66,7 @@ class Camera : public SceneObject {
   /// All rays are parallel. The functions of directions, project() and sample_towards() are then unavailable: no light
   /// path finds the camera.
   bool is_orthographic() const { return settings_.orthographic; }
+  bool is_panorama() const { return settings_.panorama != Panorama::kNone; }
   /// Density of the lens position, per unit area of the lens; 1 for a pinhole.
   float pdf_position() const { return pdf_position_; }
   /// Density of the ray's direction per unit solid angle; the same for all points on the lens. 0 behind the camera.
@@ -83,6 +91,8 @@ class Camera : public SceneObject {
   Vec3 origin_, x_, y_, z_;
   Vec3 to_x_, to_y_, to_z_;  // rows of the inverse of (x_, y_, z_): local coordinates of world vectors
   Ray orthographic_ray(float sx, float sy) const;
+  Ray panorama_ray(float sx, float sy) const;
+  Vec2 project_panorama(const Vec3& d) const;
   Vec3 lens_normal_;  // unit, along the viewing axis
   float pdf_position_ = 1;
   float pixels_per_area_;  // film area in pixels over area of the image plane at distance 1, in world units

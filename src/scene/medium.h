@@ -25,6 +25,7 @@ using PhasePtr = std::shared_ptr<const PhaseFunction>;
 struct MediumSettings {
   VolumePtr extinction;  ///< per unit length, before `scale`
   VolumePtr albedo;      ///< single-scattering albedo, in [0, 1]
+  VolumePtr radiance;    ///< of a piece so thick that it is opaque, without scattering; null: emits no light
   PhasePtr phase;
   float scale = 1;          ///< factor on the extinction
   bool homogeneous = true;  ///< constant extinction, without bounds
@@ -45,6 +46,12 @@ class Medium final : public SceneObject {
   Coefficients at(const Vec3& p) const {
     const Spectrum extinction = settings_.homogeneous ? majorant_ : settings_.extinction->eval(p) * settings_.scale;
     return {extinction, extinction * settings_.albedo->eval(p)};
+  }
+  /// Whether it glows.
+  bool emits() const { return settings_.radiance != nullptr; }
+  /// Radiance emitted per unit length at a point with these coefficients: what it absorbs times what it glows by.
+  Spectrum emission(const Vec3& p, const Coefficients& here) const {
+    return (here.extinction - here.scattering) * settings_.radiance->eval(p);
   }
   /// Upper bound on the extinction.
   const Spectrum& majorant() const { return majorant_; }

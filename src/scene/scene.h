@@ -53,6 +53,7 @@ struct SceneParts {
   std::shared_ptr<const Emitter> background;
   MediumPtr camera_medium;                    ///< that the camera is in; null: none
   std::optional<ColourMatrix> film_response;  ///< from radiance to the film's values; none: they are the radiance
+  bool media_emit = false;                    ///< a medium that is used emits light
   std::string first_medium;  ///< location in the file of the first medium that is used; empty: there is none
 };
 

@@ -110,6 +110,43 @@ TEST(Media, LightSamplesSeeThroughBoundaries) {
   expect_mean(render(load(box(grid_medium({0.05f, 0.15f}, "0")) + body, 2), 256, 5), 0, unhidden * std::exp(-2 * 0.4));
 }
 
+// Without scattering, a glowing medium adds radiance (1 - exp(-depth)).
+TEST(Media, WhatAbsorbsMayGlow) {
+  const std::string glow = "<rgb name='radiance' value='3, 2, 1'/>";
+  const Film film = render(load(box(medium("0.05, 0.2, 0.5", "0", glow)) + kLitWall), 1024, 11);
+  const Film grid = render(load(box(grid_medium({0.1f, 0.7f, 0.3f}, "0", 1, glow)) + kLitWall), 1024, 12);
+  for (int c = 0; c < 3; ++c) {
+    SCOPED_TRACE(c);
+    const double through = std::exp(-4 * (c == 0 ? 0.05 : c == 1 ? 0.2 : 0.5));
+    expect_mean(film, c, (c + 1) * through + (3 - c) * (1 - through), 0.05);
+    const double beyond = std::exp(-2 * 1.1 * 2 / 3);
+    expect_mean(grid, c, (c + 1) * beyond + (3 - c) * (1 - beyond), 0.06);
+  }
+}
+
+// Radiance that varies: layers along the ray, each of depth d_i, glow by their own and shine through those in front.
+TEST(Media, EachPartOfAGridGlowsByItsOwnRadiance) {
+  const std::string file = test_support::test_file("glow.vol");
+  std::ofstream(file, std::ios::binary) << test_support::volume_text(1, 1, 2, 1, {3, 1});
+  const std::string glow =
+      "<volume type='gridvolume' name='radiance'><string name='filename' value='" + file +
+      "'/><string name='filter_type' value='nearest'/><boolean name='use_grid_bbox' value='true'/><transform "
+      "name='to_world'><translate z='5'/></transform></volume>";
+  const Film film = render(load(box(grid_medium({0.3f, 0.3f}, "0", 1, glow))), 1024, 13);
+  const double one = std::exp(-0.6);  // the camera looks along z: the first cell is in front
+  expect_mean(film, 1, 3 * (1 - one) + one * (1 - one));
+}
+
+// Kirchhoff: what glows as its surroundings do is invisible, however it scatters.
+TEST(Media, WhatGlowsLikeItsSurroundingsIsInvisible) {
+  const std::string glow = "<rgb name='radiance' value='1'/>";
+  for (const std::string& inside : {medium("0.1, 0.4, 1", "0.5", glow), grid_medium({0.1f, 0.9f, 0.4f}, "0.7", 1, glow),
+                                    grid_medium({0.1f, 0.6f, 0, 0.2f, 0.1f, 0.9f}, "0.3", 3, glow)}) {
+    const Film film = render(load(box(inside) + kSky), 256, 14);
+    for (int c = 0; c < 3; ++c) expect_mean(film, c, 1, 0.05);
+  }
+}
+
 // In a uniform environment of radiance 1, a medium with albedo 1 is invisible.
 TEST(Media, WhatScattersEverythingIsInvisible) {
   const std::string forwards = "<phase type='hg'><float name='g' value='0.7'/></phase>";

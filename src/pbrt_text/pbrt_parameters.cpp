@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pbrt/pbrt_parameters.h"
+#include "pbrt_text/pbrt_parameters.h"
 
 #include <fmt/format.h>
 

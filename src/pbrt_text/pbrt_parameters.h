@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/colour_matrix.h"
-#include "pbrt/pbrt_tokens.h"
+#include "pbrt_text/pbrt_tokens.h"
 
 namespace covary {
 
