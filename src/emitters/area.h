@@ -58,6 +58,7 @@ class AreaLight final : public Emitter {
   /// pi times the integral of radiance over the surface; by quadrature for textures.
   Spectrum power() const override;
   bool knows_power() const override { return !textured_; }
+  bool emits_on_both_sides() const override { return settings_.two_sided; }
 
  private:
   /// A sampled surface point with its density per unit area.

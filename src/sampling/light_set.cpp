@@ -125,7 +125,8 @@ ClusterLight cluster_light(const Light& light, const Bounds3& scene) {
   if (const Shape* shape = light.emitter->shape()) {
     result.bounds = shape->part_bounds(light.part);
     const Vec3 normal = shape->part_normal(light.part);
-    if (length_squared(normal) > 0) result.axis = normal, result.cos_half_angle = 1;
+    if (length_squared(normal) > 0 && !light.emitter->emits_on_both_sides())
+      result.axis = normal, result.cos_half_angle = 1;
     return result;
   }
   const Vec3 centre = scene.center();

@@ -127,6 +127,34 @@ TEST(LightSet, PartsCarryThePowerOfTheWhole) {
   EXPECT_NEAR(luminance(mesh.part_power(0) + mesh.part_power(1)), luminance(mesh.power()), 1e-5);
 }
 
+/// What emits on both sides is grouped by place; what does not, by direction, too.
+TEST(LightSet, TwoSidedLightsHaveNoDirection) {
+  for (const bool two_sided : {false, true}) {
+    SceneParts parts;
+    for (const float x : {0.0f, 0.4f, 1.5f}) {
+      MeshData data;
+      data.positions = {{x, 0, 0}, {x, 0.1f, 0}, {x + 0.1f, 0, 0}};
+      data.triangles = {{0, 1, 2}};
+      data.flip_normals = x == 0.4f;
+      auto shape = std::make_shared<TriangleMesh>(std::move(data));
+      AreaLightSettings settings{std::make_shared<ConstantTexture>(Spectrum(1))};
+      settings.two_sided = two_sided;
+      auto light = std::make_shared<AreaLight>(std::move(settings));
+      light->attach(shape.get());
+      shape->set_emitter(light);
+      shape->set_bsdf(std::make_shared<BlackBsdf>());
+      parts.shapes.push_back(std::move(shape));
+      parts.emitters.push_back(light);
+    }
+    parts.camera = std::make_shared<Camera>(CameraSettings{}, 4, 4);
+    const Scene scene(std::move(parts));
+    const LightClusters clusters = cluster_light_set(LightSet(scene, LightSelection::kPower), scene.bounds(), 2);
+    ASSERT_EQ(clusters.n_clusters, 2u);
+    EXPECT_EQ(clusters.cluster_of[0] == clusters.cluster_of[1], two_sided);
+    EXPECT_EQ(clusters.cluster_of[0] == clusters.cluster_of[2], !two_sided);
+  }
+}
+
 /// A spotlight projecting a texture of 300 x 300 texels, of which only 2 x 2 at the given place are bright.
 std::shared_ptr<Emitter> spot_with_bright_texels(int x, int y) {
   TexelImage image;

@@ -133,6 +133,8 @@ class Emitter : public SceneObject {
   virtual Spectrum part_power(uint32_t /*part*/) const { return power(); }
   /// The surface of an area light, or null.
   virtual const Shape* shape() const { return nullptr; }
+  /// Whether an area light emits on both sides of its surface.
+  virtual bool emits_on_both_sides() const { return false; }
   /// What sample_towards() samples if that is a parallelogram, so that many samples can be taken at once; otherwise
   /// null.
   virtual const ParallelogramLight* parallelogram() const { return nullptr; }

@@ -425,5 +425,31 @@ TEST(ControlledPath, IsToldApartByItsTraining) {
             trained(everything(), options(ControlKind::kRgb)).integrator().description());
 }
 
+/// A wall lit by a small lamp that emits on both sides, in front or turned around: E = L A cos cos / d^2.
+TEST(ControlledPath, TwoSidedLampsShineOnBothSides) {
+  const double expected = 0.5 / M_PI * 100 * 0.16 * 0.5 / 18;
+  for (const char* angle : {"0", "180"}) {
+    const std::string place =
+        "<scale value='0.2'/><rotate y='1' angle='" + std::string(angle) + "'/><translate y='3' z='7'/>";
+    const std::string lamp =
+        rectangle(place.c_str(),
+                  "<emitter type='area'><boolean name='two_sided' value='true'/><float name='radiance' "
+                  "value='100'/></emitter>");
+    const std::string text =
+        scene_text(rectangle("<scale value='9'/><rotate y='1' angle='180'/><translate z='10'/>",
+                             "<bsdf type='diffuse'><float name='reflectance' value='0.5'/></bsdf>") +
+                       lamp,
+                   kSide, kSide, 2, "<float name='fov' value='0.1'/>");
+    const TestScene plain = load_text(text), control = trained(text, options(ControlKind::kRgb));
+    for (const TestScene* scene : {&plain, &control}) {
+      const Film film = render(*scene, 64, 21);
+      double sum = 0;
+      for (int y = 0; y < kSide; ++y)
+        for (int x = 0; x < kSide; ++x) sum += film.mean(x, y).g;
+      EXPECT_NEAR(sum / (kSide * kSide), expected, 0.015 * expected) << angle << (scene == &control);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace covary
