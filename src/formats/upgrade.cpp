@@ -180,7 +180,7 @@ void upgrade_object(ObjectDescription& object, Diagnostics& diagnostics) {
   } else if (object.kind == "medium" || object.kind == "volume") {
     upgrade_volume(object);
   } else if (object.kind == "integrator") {
-    drop(object, {"strict_normals"}, diagnostics);
+    drop(object, {"light_image", "sample_direct", "strict_normals"}, diagnostics);
   } else if (object.kind == "shape") {
     drop(object, {"collapse"}, diagnostics);
   }

@@ -200,14 +200,17 @@ TEST(XmlReader, TurnsOldTextureParametersIntoTodays) {
 TEST(XmlReader, WarnsAboutWhatItDropsFromOldFiles) {
   const Read r = read_old(
       "<film type=\"ldrfilm\"><float name=\"gamma\" value=\"2.2\"/><integer name=\"width\" value=\"3\"/></film>\n"
-      "<integrator type=\"path\"><boolean name=\"strictNormals\" value=\"true\"/></integrator>");
+      "<integrator type=\"path\"><boolean name=\"strictNormals\" value=\"true\"/><boolean name=\"sampleDirect\" "
+      "value=\"true\"/></integrator>");
   EXPECT_EQ(r.errors, "no error");
   EXPECT_EQ(child(r).type, "hdrfilm");
   EXPECT_EQ(child(r).properties.size(), 1u);
   EXPECT_EQ(child(r, 1).properties.size(), 0u);
-  ASSERT_EQ(r.warnings.size(), 2u);
+  ASSERT_EQ(r.warnings.size(), 3u);
   EXPECT_EQ(r.warnings[0], "scene.xml:2:1: film 'ldrfilm' is read as 'hdrfilm'");
   EXPECT_EQ(r.warnings[1],
+            "scene.xml:3:73: parameter 'sample_direct' of integrator 'path' has no counterpart today and is ignored");
+  EXPECT_EQ(r.warnings[2],
             "scene.xml:3:25: parameter 'strict_normals' of integrator 'path' has no counterpart today and is ignored");
 }
 
