@@ -12,9 +12,11 @@
 #include "commands.h"
 #include "core/error.h"
 #include "declared_options.h"
+#include "io/scene_file.h"
 #include "numbers.h"
 #include "passes/light_pass.h"
 #include "plans/integrator_choice.h"
+#include "render_steps.h"
 #include "stages.h"
 #include "value_names.h"
 
@@ -79,6 +81,7 @@ LoadedScene load(const RenderOptions& options) {
   LoadOptions loading = load_options(options.scene_options);
   loading.width = options.settings.width, loading.height = options.settings.height;
   loading.view = options.settings.view;
+  if (is_gltf_file(options.scene)) loading.time = time_of_frame(options);
   loading.make_integrator = integrator_maker({options.settings.integrator, options.of_integrator});
   LoadedScene scene = load_scene(options.scene, loading);
   check_integrator(options, scene);

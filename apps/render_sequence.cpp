@@ -18,6 +18,7 @@
 #include "core/stopwatch.h"
 #include "core/unfinished.h"
 #include "film/image_file.h"
+#include "io/scene_file.h"
 #include "passes/motion.h"
 #include "plans/budget.h"
 #include "plans/camera_path.h"
@@ -92,13 +93,19 @@ bool is_complete(const std::string& path, const std::string& hash) {
                           path));
 }
 
+constexpr double kGltfRate = 24;  // whose animations are in seconds
+
 /// The times of frames, and the camera's place at each.
 class FrameTimes {
  public:
   FrameTimes() = default;
-  explicit FrameTimes(const SequenceSettings& sequence) {
+  explicit FrameTimes(const RenderOptions& options) {
+    const SequenceSettings& sequence = options.sequence;
     if (!sequence.camera_path.empty()) path_ = read_camera_path(sequence.camera_path);
-    rate_ = sequence.frames_per_second > 0 ? sequence.frames_per_second : path_ ? path_->frames_per_second() : 1;
+    rate_ = sequence.frames_per_second > 0 ? sequence.frames_per_second
+            : path_                        ? path_->frames_per_second()
+            : is_gltf_file(options.scene)  ? kGltfRate
+                                           : 1;
   }
 
   double time(int frame) const { return frame / rate_; }
@@ -159,8 +166,8 @@ class SequenceRender {
       if (!options_.sequence.camera_path.empty()) outputs_.back().reads(options_.sequence.camera_path);
     }
     display_ = display_of(options_);
-    times_ = FrameTimes(options_.sequence);
-    if (!has_many_scenes()) load_scene(options_, outputs_);
+    times_ = FrameTimes(options_);
+    if (!has_many_scenes()) load_scene(frame_options(options_, frames_.front()), outputs_);
     const StopFlag stop;
     for (size_t i = 0; i < frames_.size(); ++i) render_frame(i, stop);
     if (stop.is_set()) throw Unfinished(stop.exit_code(), "interrupted when the last frame was written");
@@ -189,7 +196,7 @@ class SequenceRender {
     const int frame = frames_[index];
     RenderOptions one = frame_options(options_, frame);
     if (stop.is_set()) throw Unfinished(stop.exit_code(), interruption(index));
-    if (has_many_scenes()) load_scene(one, std::span(outputs_).subspan(index, 1));
+    if (has_many_scenes() || (scene_->is_animated && index > 0)) load_scene(one, std::span(outputs_).subspan(index, 1));
     RenderRequest request = make_request(one, *scene_);
     if (preview_stops_) request.exposure = *preview_stops_;
     const bool follows = frame - 1 == last_frame_;  // the previous frame is unknown otherwise
@@ -246,6 +253,11 @@ class SequenceRender {
 
 void render_sequence(const RenderOptions& options, int threads) { SequenceRender(options, threads).run(); }
 
+std::optional<double> time_of_frame(const RenderOptions& options) {
+  if (!options.sequence.frames) return std::nullopt;
+  return FrameTimes(options).time(options.sequence.frames->first);
+}
+
 void take_frame(RenderOptions& options) {
   const std::vector<int> frames = options.sequence.frames->numbers();
   if (frames.size() != 1) throw Error(ErrorCode::kUsage, "--replay needs a single frame, e.g. --frames 7");
@@ -253,7 +265,7 @@ void take_frame(RenderOptions& options) {
 }
 
 void place_frame(const RenderOptions& options, LoadedScene& scene) {
-  const FrameTimes times(options.sequence);
+  const FrameTimes times(options);
   const int frame = options.sequence.frames->first;
   times.place(frame, times.camera(scene, frame).value_or(scene.camera->settings().to_world), scene);
 }

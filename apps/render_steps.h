@@ -46,6 +46,8 @@ void render_sequence(const RenderOptions& options, int threads);
 
 /// For --replay: the options of the only frame of options.sequence; throws Error(kUsage) if there are more.
 void take_frame(RenderOptions& options);
+/// The time in seconds of a single frame, at which the animations of a glTF file are; nullopt without --frames.
+std::optional<double> time_of_frame(const RenderOptions& options);
 /// Then moves the camera to its place in that frame.
 void place_frame(const RenderOptions& options, LoadedScene& scene);
 

@@ -15,6 +15,8 @@
 // | thin                | boolean        | true    | what transmits is a sheet without refraction, not a solid       |
 // | clearcoat           | number/texture | 0       | strength of a second, clear layer of index 1.5                  |
 // | clearcoat_roughness | number/texture | 0       | its roughness                                                   |
+// | clearcoat_normal    | texture        |         | the layer's own normal, as in `normalmap`; otherwise the base's |
+// | base_normal         | texture        |         | with that: the map of the `normalmap` around this, if any       |
 // | sheen_color         | colour/texture | 0       | of light reflected by fibres on top (charlie_sheen.h)           |
 // | sheen_roughness     | number/texture | 0       | its roughness                                                   |
 // | anisotropy          | number         | 0       | blends GGX alpha along the direction of anisotropy with 1       |
@@ -40,6 +42,8 @@
 // The specification demands that energy is conserved, but its sample implementation (q = 1) reflects up to 1.3 times
 // the light for bright colours at grazing angles. Where the albedos E of diffuse and specular light add up to more than
 // 1, q = (1 - E_s(V)) / (max base E_d(V)) leaves them 1.
+//
+// A coat with a normal of its own has its cosines and microfacets about that normal.
 //
 // V is the direction of the viewer: neither q nor a coat is reciprocal. If nothing is transmitted, the side opposite
 // the normal is black; a sheet looks alike from both sides; a solid refracts on both.
@@ -89,6 +93,8 @@ class MetalRoughClosure final : public BsdfClosure {
         sheen_(p.sheen),
         sheen_model_(p.sheen_roughness),
         sheen_roughness_(p.sheen_roughness) {
+    tilted_ = !(p.coat_normal == Vec3{0, 0, 1});
+    if (tilted_) coat_frame_ = Frame::from_tangent(turned(p.coat_normal, sin_turn_), {1, 0, 0});
     const Spectrum r0 = p.specular_color * schlick_r0(settings.ior);
     f0_ = Spectrum(std::min(r0.r, 1.0f), std::min(r0.g, 1.0f), std::min(r0.b, 1.0f)) * p.specular;
     const float scattered = (1 - p.metallic) * (1 - p.transmission) * kInvPi;
@@ -164,13 +170,16 @@ class MetalRoughClosure final : public BsdfClosure {
   Vec3 turned(const Vec3& w, float sine) const {
     return {cos_turn_ * w.x + sine * w.y, cos_turn_ * w.y - sine * w.x, w.z};
   }
+  /// In the frame of the coat's normal.
+  Vec3 in_coat(const Vec3& w) const { return tilted_ ? coat_frame_.to_local(w) : w; }
   Vec3 local(const View& view, const Vec3& wi) const { return turned(view.front ? wi : -wi, sin_turn_); }
 
   /// Estimates of the lobes' albedos, which must not depend on the transport mode. Diffuse light meets microfacets half
   /// way between o and the normal. What reflects at no angle seen here may do so at others: nothing is 0.
   void lobe_probabilities(View& view) const {
     const float z = view.o.z, half = std::sqrt(0.5f * (1 + z));
-    const float coat = view.inside ? 0 : coat_ * std::max(coat_fresnel(z), 0.1f), base = 1 - coat;
+    const float coat_z = in_coat(view.o).z;
+    const float coat = view.inside || coat_z <= 0 ? 0 : coat_ * std::max(coat_fresnel(coat_z), 0.1f), base = 1 - coat;
     const float passed = view.inside ? 0 : base * std::max(1 - max_component(dielectric_fresnel(half)), 0.05f);
     view.pmf[kDiffuse] =
         passed * mean(diffuse_) * kPi + (has_sheen() ? base * mean(sheen_) * charlie_albedo(z, sheen_roughness_) : 0);
@@ -187,6 +196,10 @@ class MetalRoughClosure final : public BsdfClosure {
   Vec3 direction(const View& view, uint32_t lobe, Vec2 u) const {
     if (lobe == kDiffuse) return warp::square_to_cosine_hemisphere(u);
     if (lobe == kThrough) return -warp::square_to_cosine_hemisphere(u);
+    if (lobe == kCoat && tilted_) {
+      const Vec3 o = in_coat(view.o), i = reflect(o, coat_distribution_.sample(o, u).m);
+      return i.z > 0 ? coat_frame_.to_world(i) : Vec3{};
+    }
     const Vec3 m = (lobe == kCoat ? coat_distribution_ : distribution_).sample(view.o, u).m;
     if (lobe == kTransmission && solid_) {
       const DielectricFresnel f = fresnel_dielectric(dot(view.o, m), view.eta);
@@ -231,7 +244,8 @@ class MetalRoughClosure final : public BsdfClosure {
   /// Value and densities of the lobes; both directions as seen from the side of wo.
   Terms terms(const View& view, const Vec3& i) const {
     Terms t;
-    const float k = coat_ > 0 ? coat_ * coat_fresnel(radiance_ ? view.o.z : std::abs(i.z)) : 0;
+    const float viewed = radiance_ ? in_coat(view.o).z : std::abs(in_coat(i).z);
+    const float k = coat_ > 0 && viewed > 0 ? coat_ * coat_fresnel(viewed) : 0;
     if (i.z > 0)
       reflection_terms(view, i, k, t);
     else if (i.z < 0 && transmits()) {
@@ -253,7 +267,14 @@ class MetalRoughClosure final : public BsdfClosure {
     }
     if (has_sheen()) t.value = t.value * under_sheen(view.o.z, i.z) + sheen_ * sheen_model_.eval(view.o, i, h);
     t.value = t.value * (1 - k);
-    if (coat_ > 0 && !view.inside) t.value += Spectrum(k * specular(coat_distribution_, view.o, i, h, t.pdf[kCoat]));
+    if (coat_ > 0 && !view.inside) t.value += Spectrum(k * coat_term(view.o, i, h, t.pdf[kCoat]));
+  }
+  float coat_term(const Vec3& o, const Vec3& i, const Vec3& h, float& pdf) const {
+    if (!tilted_) return specular(coat_distribution_, o, i, h, pdf);
+    const Vec3 oc = in_coat(o), ic = in_coat(i);
+    if (!(oc.z > 0 && ic.z > 0)) return 0;
+    const float value = specular(coat_distribution_, oc, ic, in_coat(h), pdf);
+    return radiance_ ? value : value * oc.z * i.z / (o.z * ic.z);  // the adjoint has the cosine of the other direction
   }
   /// Reflected light that goes straight through instead.
   void sheet_terms(const View& view, const Vec3& i, Terms& t) const {
@@ -288,7 +309,8 @@ class MetalRoughClosure final : public BsdfClosure {
   Microfacet distribution_, coat_distribution_;
   float eta_, roughness_, coat_, f90_, metallic_, film_, film_ior_, film_thickness_, cos_turn_, sin_turn_;
   uint32_t flags_;
-  bool solid_, radiance_;
+  bool solid_, radiance_, tilted_;
+  Frame coat_frame_;
   Spectrum base_, f0_, diffuse_, transmitted_, through_, sheen_;
   CharlieSheen sheen_model_;
   float sheen_roughness_;
@@ -300,12 +322,12 @@ class MetalRough final : public Bsdf {
       : in_(std::move(inputs)),
         settings_(settings),
         // If no parameter is textured, all points share the same closures.
-        constant_(is_constant(in_)),
+        constant_(is_constant(in_) && (settings.anisotropy == 0 || settings.anisotropy_rotation == 0)),
         constant_closures_{{constant_point(), settings, TransportMode::kRadiance},
                            {constant_point(), settings, TransportMode::kImportance}} {}
 
   uint32_t flags() const override { return settings_.flags(); }
-  bool needs_derivatives() const override { return settings_.anisotropy != 0; }
+  bool needs_derivatives() const override { return settings_.anisotropy != 0 || in_.clearcoat_normal; }
   const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode mode, Arena& arena) const override {
     if (constant_) return &constant_closures_[mode == TransportMode::kRadiance ? 0 : 1];
     return arena.make<MetalRoughClosure>(point_of(in_, settings_, hit), settings_, mode);
@@ -340,7 +362,9 @@ std::shared_ptr<Bsdf> make_metallicroughness(Parameters& parameters) {
                       fraction("iridescence", 0),
                       NumberInput(parameters.get_texture("iridescence_thickness", 400)),
                       fraction("diffuse_transmission", 0),
-                      parameters.find_texture("anisotropy_map")};
+                      parameters.find_texture("anisotropy_map"),
+                      parameters.find_texture("clearcoat_normal"),
+                      parameters.find_texture("base_normal")};
   const auto some = [](const NumberInput& n) { return !n.is_constant() || n.constant() > 0; };
   const MetalRoughSettings settings{parameters.get_float("ior", 1.5f, 0, 100),
                                     parameters.get_float("iridescence_ior", 1.3f, 1, 100),

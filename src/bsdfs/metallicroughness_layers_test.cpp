@@ -96,6 +96,37 @@ TEST(MetallicRoughnessLayers, AnisotropyStretchesAlongItsDirection) {
   }
 }
 
+/// KHR_materials_clearcoat with a normal map: its Fresnel and microfacets about that normal, on a black base. The other
+/// way round, for light paths, the value is the adjoint.
+TEST(MetallicRoughnessLayers, CoatsMayHaveNormalsOfTheirOwn) {
+  const Vec3 n = normalize(Vec3{0.3f, -0.2f, 1});
+  const auto map = [](const Vec3& m) { return rgb(0.5 + 0.5 * m.x, 0.5 + 0.5 * m.y, 0.5 + 0.5 * m.z); };
+  const Json coat = model({{"base_color", 0.0},
+                           {"specular", 0.0},
+                           {"clearcoat", 0.8},
+                           {"clearcoat_roughness", 0.6},
+                           {"clearcoat_normal", map(n)}});
+  const double alpha = 0.36;
+  const auto g1 = [&](double c) { return 2 * c / (c + std::sqrt(alpha * alpha + (1 - alpha * alpha) * c * c)); };
+  for (const float phi : {0.0f, 2.0f, 4.0f}) {
+    const Vec3 v = direction(35, phi), l = direction(50, phi + 2), h = normalize(v + l);
+    const double vn = dot(v, n), ln = dot(l, n), hn = dot(h, n);
+    const double d = alpha * alpha / (M_PI * std::pow(hn * hn * (alpha * alpha - 1) + 1, 2));
+    const double k = 0.8 * (0.04 + 0.96 * std::pow(1 - vn, 5)), expected = k * d * g1(vn) * g1(ln) / (4 * vn);
+    EXPECT_NEAR(Bound(coat, v)->eval(v, l).value.g, expected, 1e-4 * expected) << phi;
+    const Spectrum adjoint = Bound(coat, l, TransportMode::kImportance)->eval(l, v).value;
+    EXPECT_NEAR(adjoint.g, expected * v.z / l.z, 1e-4 * expected) << phi;
+  }
+  const Vec3 v = direction(50, 1), l = direction(40, 3);
+  Json under_map = coat;
+  under_map["base_normal"] = map(n);  // the base's normal is the coat's
+  Json plain = coat;
+  plain.erase("clearcoat_normal");
+  const float expected = Bound(plain, v)->eval(v, l).value.g;
+  EXPECT_NEAR(Bound(under_map, v)->eval(v, l).value.g, expected, 1e-3f * expected);
+  check_closure(*Bound(coat, v), v, kModelChi2, 17);
+}
+
 /// Airy's sum for three wavelengths, with Schlick's reflectances of the two interfaces: what the extension approximates
 /// for broad bands. Exact where the film is much thinner than a wavelength, and for a base like the film.
 TEST(MetallicRoughnessLayers, IridescenceIsThatOfAThinFilm) {

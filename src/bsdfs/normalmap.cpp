@@ -7,8 +7,10 @@
 // | (nested)               | bsdf    |          | exactly one model                                              |
 // | flip_invalid_normals   | bool    | true     | keep the normal on the side of the camera (perturbed.h)        |
 // | use_shadowing_function | bool    | true     | soften the shadow at grazing light (perturbed.h)               |
+// | along_dv               | bool    | false    | our own: the y axis of stored normals follows dp/dv            |
 //
-// The x axis of the stored normals follows dp/du.
+// The x axis of the stored normals follows dp/du. Their y axis is normal x dp/du, which points against dp/dv where the
+// texture is mirrored; with `along_dv` it does not, as in glTF.
 #include "bsdfs/inputs.h"
 #include "bsdfs/perturbed.h"
 #include "bsdfs/registry.h"
@@ -19,12 +21,13 @@ namespace {
 class NormalMap final : public PerturbingBsdf {
  public:
   NormalMap(TexturePtr normals, BsdfPtr nested, Parameters& p)
-      : PerturbingBsdf(std::move(nested), p), normals_(std::move(normals)) {}
+      : PerturbingBsdf(std::move(nested), p), normals_(std::move(normals)), along_dv_(p.get_bool("along_dv", false)) {}
 
   const BsdfClosure* bind(const SurfaceHit& hit, bool wo_front, TransportMode mode, Arena& arena) const override {
     const PerturbedModel model = PerturbedModel::bind(*nested_, flip_invalid_, hit, wo_front, mode, arena);
     const Spectrum c = normals_->eval(hit);
-    const Vec3 stored{2 * c.r - 1, 2 * c.g - 1, 2 * c.b - 1};
+    const float side = along_dv_ && dot(cross(hit.frame.n, hit.dp_du), hit.dp_dv) < 0 ? -1.0f : 1.0f;
+    const Vec3 stored{2 * c.r - 1, side * (2 * c.g - 1), 2 * c.b - 1};
     const float l = length(stored);
     if (!(l > 0)) return model.here;
     // From the frame along dp/du to the local shading frame; identity if they coincide.
@@ -34,6 +37,7 @@ class NormalMap final : public PerturbingBsdf {
 
  private:
   TexturePtr normals_;
+  bool along_dv_;
 };
 
 }  // namespace

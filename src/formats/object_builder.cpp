@@ -44,13 +44,17 @@ std::string ply_text(const EmbeddedMesh& mesh) {
   if (!mesh.uvs.empty()) text += "property float u\nproperty float v\n";
   if (!mesh.colours.empty()) text += "property float r\nproperty float g\nproperty float b\n";
   if (!mesh.alphas.empty()) text += "property float alpha\n";
+  if (!mesh.tangents.empty()) text += "property float tx\nproperty float ty\nproperty float tz\nproperty float tw\n";
+  for (const auto& [name, values] : mesh.pairs)
+    for (int c = 0; c < 3; ++c) text += fmt::format("property float {}_{}\n", name, c);
   text += fmt::format("element face {}\nproperty list uchar int vertex_indices\nend_header\n", mesh.corners.size() / 3);
   const auto add = [&](const std::vector<double>& values, size_t i, size_t width) {
     for (size_t k = 0; k < width && !values.empty(); ++k) append(text, static_cast<float>(values[i * width + k]));
   };
   for (size_t i = 0; i < n; ++i) {
     add(mesh.positions, i, 3), add(mesh.normals, i, 3), add(mesh.uvs, i, 2);
-    add(mesh.colours, i, 3), add(mesh.alphas, i, 1);
+    add(mesh.colours, i, 3), add(mesh.alphas, i, 1), add(mesh.tangents, i, 4);
+    for (const auto& [name, values] : mesh.pairs) add(values, i, 2), append(text, 0.0f);
   }
   for (size_t i = 0; i < mesh.corners.size(); ++i) {
     if (i % 3 == 0) append(text, uint8_t{3});

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <initializer_list>
+#include <map>
 #include <memory>
 #include <string>
 #include <unordered_set>
@@ -41,7 +42,9 @@ void visit_properties(const ObjectDescription& root, const Visit& visit) {
 struct EmbeddedMesh {
   std::vector<double> positions, normals, uvs;  ///< three, three and two numbers per vertex; the last two may be empty
   std::vector<double> colours, alphas;  ///< three and one; may be empty; attributes vertex_color and vertex_alpha
-  std::vector<double> corners;          ///< three indices per triangle, integers in range
+  std::vector<double> tangents;         ///< four, the last one the side; may be empty
+  std::map<std::string, std::vector<double>> pairs;  ///< two numbers per vertex: more attributes, vertex_NAME, by NAME
+  std::vector<double> corners;                       ///< three indices per triangle, integers in range
 };
 
 /// The mesh as a binary PLY file.

@@ -17,6 +17,8 @@ struct SceneXml {
   std::shared_ptr<const ObjectDescription> scene;
   /// Hash of the text of all XML files read, and of the defines.
   uint64_t hash = 0;
+  /// The file has animations of its own, and is read again for each time (glTF).
+  bool is_animated = false;
 };
 
 /// Reads the XML `text` and every file it includes. `name` is used as its file name in messages, and its folder is

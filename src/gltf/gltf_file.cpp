@@ -89,7 +89,8 @@ GltfFile::GltfFile(std::string_view bytes, const std::string& name, FileResolver
     throw Error(ErrorCode::kInput,
                 fmt::format("{}: the file has {} bytes; at most 2 GB are accepted", name, bytes.size()));
   GltfJson prepared = prepare_gltf(bytes, name);
-  images_ = std::move(prepared.images), is_animated_ = prepared.is_animated;
+  images_ = std::move(prepared.images);
+  animations_ = std::move(prepared.animations), moves_pointers_ = prepared.moves_pointers;
   tinygltf::TinyGLTF loader;
   const std::string folder = std::filesystem::path(name).parent_path().string();
   std::string problem, warning;

@@ -24,7 +24,10 @@ class GltfFile {
 
   const tinygltf::Model& model() const { return model_; }
   const std::vector<GltfImage>& images() const { return images_; }
-  bool is_animated() const { return is_animated_; }
+  const std::vector<GltfAnimation>& animations() const { return animations_; }
+  /// Animations move other properties than those of nodes.
+  bool moves_pointers() const { return moves_pointers_; }
+  tinygltf::Node& node(int node) { return model_.nodes[static_cast<size_t>(node)]; }
   const SourceLocation& where() const { return where_; }
   void error(const std::string& message);
   /// Each message is reported once.
@@ -52,7 +55,8 @@ class GltfFile {
 
   tinygltf::Model model_;
   std::vector<GltfImage> images_;
-  bool is_animated_ = false;
+  std::vector<GltfAnimation> animations_;
+  bool moves_pointers_ = false;
   SourceLocation where_;
   FileResolver& files_;
   Diagnostics& diagnostics_;

@@ -80,6 +80,32 @@ std::vector<GltfImage> take_images(json& file) {
   return images;
 }
 
+int index_of(json& object, const char* key) {
+  const json* number = find(object, key, json::value_t::number_unsigned);
+  return number && number->get<uint64_t>() < (1u << 30) ? number->get<int>() : -1;
+}
+
+void take_animations(json& file, GltfJson& result) {
+  each(file, "animations", [&](json& animation) {
+    GltfAnimation taken{text_of(animation, "name"), {}};
+    json* samplers = find(animation, "samplers", json::value_t::array);
+    each(animation, "channels", [&](json& channel) {
+      json* target = find_object(channel, "target");
+      const int sampler = index_of(channel, "sampler");
+      if (!target || !samplers || sampler < 0 || static_cast<size_t>(sampler) >= samplers->size()) return;
+      json& of = (*samplers)[static_cast<size_t>(sampler)];
+      const std::string path = text_of(*target, "path"), interpolation = text_of(of, "interpolation");
+      const int node = index_of(*target, "node");
+      result.moves_pointers |= path == "pointer";
+      if (node < 0 || path == "pointer") return;
+      taken.channels.push_back({node, index_of(of, "input"), index_of(of, "output"), path,
+                                interpolation.empty() ? "LINEAR" : interpolation});
+    });
+    if (!taken.channels.empty()) result.animations.push_back(std::move(taken));
+  });
+  file.erase("animations");
+}
+
 /// Buffers without bytes, which stand for decompressed ones, and data URIs of types that tinygltf does not know.
 void complete_buffers(json& file, bool is_binary) {
   size_t index = 0;
@@ -160,7 +186,7 @@ GltfJson prepare_gltf(std::string_view bytes, const std::string& name) {
   const bool is_old = find_object(file, "nodes") || find_object(file, "meshes");  // lists since 2.0
   if (!version.starts_with("2") && (is_old || !version.empty()))
     refuse_version(name, version.empty() ? "1.0" : version);
-  result.is_animated = file.erase("animations") > 0;
+  take_animations(file, result);
   result.images = take_images(file);
   complete_buffers(file, result.is_binary);
   remove_absent_indices(file);

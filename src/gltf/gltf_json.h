@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The JSON of a glTF file, before tinygltf reads it. Removed is what changes no still picture but stops tinygltf in
-// files that are valid or nearly so (animations of pointers, which have no node), and what is read here instead:
-// images, which may be in formats that it does not know, and what compressed meshes replace.
+// The JSON of a glTF file, before tinygltf reads it. Removed is what is read here instead: images, which may be in
+// formats that it does not know, what compressed meshes replace, and animations, of which those of pointers, which have
+// no node, stop it.
 #pragma once
 
 #include <string>
@@ -15,10 +15,23 @@ struct GltfImage {
   int view = -1;  ///< buffer view, if there is no URI
 };
 
+/// What moves one property of a node over time.
+struct GltfChannel {
+  int node = -1, input = -1, output = -1;  ///< accessors of times in seconds and of values
+  std::string path;                        ///< translation, rotation, scale or weights
+  std::string interpolation;               ///< LINEAR, STEP or CUBICSPLINE
+};
+struct GltfAnimation {
+  std::string name;
+  std::vector<GltfChannel> channels;
+};
+
 struct GltfJson {
   std::string bytes;  ///< for tinygltf: JSON, or a binary file if the given one is
-  bool is_binary = false, is_animated = false;
+  bool is_binary = false;
+  bool moves_pointers = false;  ///< animations move other properties than those of nodes
   std::vector<GltfImage> images;
+  std::vector<GltfAnimation> animations;  ///< those with channels
 };
 
 /// Throws Error(kInput) if the file is damaged, or of another version than 2.

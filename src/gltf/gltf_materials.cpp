@@ -92,40 +92,49 @@ const tinygltf::Material& GltfMaterials::of(int material) const {
 
 ObjectPtr GltfMaterials::model(int material, const GltfColours& vertices) {
   const auto [made, is_new] = models_.try_emplace({material, vertices});
+  textures_->take_as_own(sets(material).own);
   if (is_new) made->second = make(of(material), vertices);
   return made->second;
 }
 
 ObjectPtr GltfMaterials::light(int material, const GltfColours& vertices) {
   const auto [made, is_new] = lights_.try_emplace({material, vertices});
+  textures_->take_as_own(sets(material).own);
   if (is_new) made->second = make_light(of(material), vertices);
   return made->second;
 }
 
-int GltfMaterials::texture_set(int material) {
-  const tinygltf::Material& m = of(material);
-  int set = -1;
-  const auto see = [&](const auto& info) {
+GltfSets GltfMaterials::sets_of(const tinygltf::Material& m) {
+  GltfSets sets;
+  int own = -1;
+  const auto see = [&](const auto& info, bool directed = false) {
     if (info.index < 0) return;
-    if (set >= 0 && set != info.texCoord)
-      file_.warn(
-          fmt::format("material '{}' uses several sets of texture coordinates: set {} is taken for all", m.name, set));
-    else
-      set = info.texCoord;
+    const int set = gltf_texture_set(info.texCoord, info.extensions);
+    if (own < 0) own = set;
+    if (set != own) sets.others.insert(set);
+    sets.tangents |= directed;
   };
-  see(base_of(m).image), see(m.pbrMetallicRoughness.metallicRoughnessTexture);
-  see(m.normalTexture), see(m.emissiveTexture);
+  see(m.normalTexture, true);
+  for (const auto& [extension, name] : {std::pair("KHR_materials_clearcoat", "clearcoatNormalTexture"),
+                                        {"KHR_materials_anisotropy", "anisotropyTexture"}})
+    if (const tinygltf::Value* khr = find_extension(m.extensions, extension)) see(image_of(*khr, name), true);
+  sets.tangents |= find_extension(m.extensions, "KHR_materials_anisotropy") != nullptr;
+  see(base_of(m).image), see(m.pbrMetallicRoughness.metallicRoughnessTexture), see(m.emissiveTexture);
   for (const auto& [extension, name] : kExtensionTextures)
-    if (const tinygltf::Value* khr = find_extension(m.extensions, extension))
-      if (const auto info = extension_texture(*khr, name)) see(*info);
-  return std::max(set, 0);
+    if (const tinygltf::Value* khr = find_extension(m.extensions, extension)) see(image_of(*khr, name));
+  sets.own = std::max(own, 0);
+  return sets;
+}
+
+ObjectPtr GltfMaterials::make_texture(const TextureInfo& image, const GltfUse& use) {
+  return textures_->make(image.index, image.texCoord, image.extensions, use);
 }
 
 // ---- parameters ----
 
 Value GltfMaterials::colour(const TextureInfo& image, const Spectrum& factor, bool vertices) {
   Value value = ColourValue{factor};
-  if (image.index >= 0) value = textures_->make(image.index, image.extensions, {.factor = factor});
+  if (image.index >= 0) value = make_texture(image, {.factor = factor});
   if (!vertices) return value;
   const ObjectPtr of_vertices =
       make_object("texture", "mesh_attribute", file_.where(), {{"name", std::string("vertex_color")}});
@@ -141,7 +150,7 @@ void GltfMaterials::set_number(ObjectDescription& model, const char* name, const
                                double factor) {
   if (image.index < 0) return set_property(model, name, in_unit(factor));
   const Spectrum times(static_cast<float>(in_unit(factor)));
-  if (const ObjectPtr texture = textures_->make(image.index, image.extensions, {GltfUse::kChannel, channel, times}))
+  if (const ObjectPtr texture = make_texture(image, {GltfUse::kChannel, channel, times}))
     set_property(model, name, texture);
 }
 
@@ -178,7 +187,7 @@ ObjectBuilder GltfMaterials::specular_glossiness(const tinygltf::Value& khr, con
   } else {
     const GltfUse use{
         .kind = GltfUse::kChannel, .channel = 3, .factor = Spectrum(-static_cast<float>(glossiness)), .offset = 1};
-    set_property(*model, "roughness", textures_->make(image.index, image.extensions, use));
+    set_property(*model, "roughness", make_texture(image, use));
   }
   return model;
 }
@@ -206,8 +215,7 @@ void GltfMaterials::set_layers(const tinygltf::Material& m, ObjectDescription& m
     set_number(model, "clearcoat", image_of(*khr, "clearcoatTexture"), 0, extension_number(*khr, "clearcoatFactor", 0));
     set_number(model, "clearcoat_roughness", image_of(*khr, "clearcoatRoughnessTexture"), 1,
                extension_number(*khr, "clearcoatRoughnessFactor", 0));
-    if (khr->Has("clearcoatNormalTexture"))
-      file_.warn(fmt::format("the clear coat of material '{}' has the normals of its base, not its own", m.name));
+    if (extension_number(*khr, "clearcoatFactor", 0) > 0) set_coat_normal(m, *khr, model);
   }
   if (const tinygltf::Value* khr = find_extension(m.extensions, "KHR_materials_sheen")) {
     set_colour(model, "sheen_color", image_of(*khr, "sheenColorTexture"),
@@ -220,7 +228,7 @@ void GltfMaterials::set_layers(const tinygltf::Material& m, ObjectDescription& m
     set_property(model, "anisotropy", in_unit(extension_number(*khr, "anisotropyStrength", 0)));
     set_property(model, "anisotropy_rotation", extension_number(*khr, "anisotropyRotation", 0));
     if (const TextureInfo image = image_of(*khr, "anisotropyTexture"); image.index >= 0)
-      set_property(model, "anisotropy_map", textures_->make(image.index, image.extensions, {GltfUse::kVector}));
+      set_property(model, "anisotropy_map", make_texture(image, {GltfUse::kVector}));
   }
   if (const tinygltf::Value* khr = find_extension(m.extensions, "KHR_materials_iridescence");
       khr && extension_number(*khr, "iridescenceFactor", 0) > 0) {
@@ -235,18 +243,27 @@ void GltfMaterials::set_layers(const tinygltf::Material& m, ObjectDescription& m
                       .channel = 1,
                       .factor = Spectrum(static_cast<float>(most - least)),
                       .offset = static_cast<float>(least)};
-    set_property(model, "iridescence_thickness", textures_->make(image.index, image.extensions, use));
+    set_property(model, "iridescence_thickness", make_texture(image, use));
   }
 }
 
 // ---- models ----
+
+ObjectPtr GltfMaterials::lit_model(const tinygltf::Material& m, const GltfColours& vertices) {
+  base_normal_ =
+      normal_map(m.normalTexture.index, m.normalTexture.texCoord, m.normalTexture.extensions, m.normalTexture.scale);
+  const ObjectPtr model = surface(m, vertices);
+  if (!base_normal_) return model;
+  return make_object("bsdf", "normalmap", file_.where(),
+                     {{"normalmap", base_normal_}, {"along_dv", true}, {"", model}});
+}
 
 ObjectPtr GltfMaterials::make(const tinygltf::Material& m, const GltfColours& vertices) {
   ObjectPtr whole;
   if (is_unlit(m))
     whole = make_object("bsdf", "diffuse", file_.where(), {{"reflectance", ColourValue{Spectrum(0)}}});
   else
-    whole = with_normals(m, surface(m, vertices));
+    whole = lit_model(m, vertices);
   if (is_unlit(m) || !(is_transmissive(m) || is_translucent(m)))  // opaque models are black from behind
     whole = ObjectPtr(make_object("bsdf", "twosided", file_.where(), {{"", whole}}));
   if (const std::optional<Value> seen = opacity(m, vertices))
@@ -255,13 +272,28 @@ ObjectPtr GltfMaterials::make(const tinygltf::Material& m, const GltfColours& ve
   return whole;
 }
 
-ObjectPtr GltfMaterials::with_normals(const tinygltf::Material& m, ObjectPtr model) {
-  if (m.normalTexture.index < 0) return model;
-  const auto scale = static_cast<float>(m.normalTexture.scale);
-  const GltfUse use{.kind = scale == 1 ? GltfUse::kVector : GltfUse::kNormal, .factor = Spectrum(scale)};
-  const ObjectPtr map = textures_->make(m.normalTexture.index, m.normalTexture.extensions, use);
-  if (!map) return model;
-  return make_object("bsdf", "normalmap", file_.where(), {{"normalmap", map}, {"", std::move(model)}});
+ObjectPtr GltfMaterials::normal_map(int texture, int set, const tinygltf::ExtensionMap& extensions, double scale) {
+  if (texture < 0) return nullptr;
+  const auto factor = static_cast<float>(scale);
+  const GltfUse use{.kind = factor == 1 ? GltfUse::kVector : GltfUse::kNormal, .factor = Spectrum(factor)};
+  return textures_->make(texture, set, extensions, use);
+}
+
+/// A coat without a map of its own has the normal of the mesh, whatever that of its base.
+void GltfMaterials::set_coat_normal(const tinygltf::Material& m, const tinygltf::Value& coat,
+                                    ObjectDescription& model) {
+  const tinygltf::Value& own = coat.Get("clearcoatNormalTexture");
+  const double scale = own.IsObject() ? extension_number(own, "scale", 1) : 1;
+  const TextureInfo image = image_of(coat, "clearcoatNormalTexture");
+  if (image.index < 0 && !base_normal_) return;
+  const bool same = image.index == m.normalTexture.index && image.texCoord == m.normalTexture.texCoord &&
+                    scale == m.normalTexture.scale && image.extensions == m.normalTexture.extensions;
+  if (same) return;
+  if (image.index < 0)
+    set_property(model, "clearcoat_normal", ColourValue{{0.5f, 0.5f, 1}});
+  else if (const ObjectPtr map = normal_map(image.index, image.texCoord, image.extensions, scale))
+    set_property(model, "clearcoat_normal", map);
+  if (base_normal_) set_property(model, "base_normal", base_normal_);
 }
 
 std::optional<Value> GltfMaterials::opacity(const tinygltf::Material& m, const GltfColours& vertices) {
@@ -271,8 +303,8 @@ std::optional<Value> GltfMaterials::opacity(const tinygltf::Material& m, const G
   const double cutoff = m.alphaMode == "MASK" ? m.alphaCutoff : -1;
   Value value = cutoff >= 0 ? (alpha >= cutoff ? 1.0 : 0.0) : alpha;
   if (base.image.index >= 0) {
-    const ObjectPtr texture = textures_->make(base.image.index, base.image.extensions,
-                                              {GltfUse::kChannel, 3, Spectrum(static_cast<float>(alpha)), cutoff});
+    const ObjectPtr texture =
+        make_texture(base.image, {GltfUse::kChannel, 3, Spectrum(static_cast<float>(alpha)), cutoff});
     if (!texture) return std::nullopt;
     value = texture;
   }
@@ -293,7 +325,7 @@ ObjectPtr GltfMaterials::make_light(const tinygltf::Material& m, const GltfColou
     radiance = colour_of(base.factor, 1);
     emitted = colour(base.image, radiance, vertices.colours);
   } else if (max_component(radiance) > 0) {
-    emitted = colour({m.emissiveTexture}, radiance);
+    emitted = colour(m.emissiveTexture, radiance);
   }
   if (!(max_component(radiance) > 0)) return nullptr;
   if (const std::optional<Value> seen = opacity(m, vertices)) {  // what is not there does not shine

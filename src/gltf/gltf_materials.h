@@ -5,18 +5,27 @@
 #include <compare>
 #include <map>
 #include <memory>
+#include <set>
 
 #include "formats/object_builder.h"
 #include "gltf/gltf_file.h"
 
 namespace covary {
 
+struct GltfUse;
 class GltfTextures;
 
 /// What the vertices of a mesh multiply the base colour by.
 struct GltfColours {
   bool colours = false, alphas = false;
   auto operator<=>(const GltfColours&) const = default;
+};
+
+/// What a material needs of its meshes.
+struct GltfSets {
+  int own = 0;            ///< the set of texture coordinates that normal maps follow
+  std::set<int> others;   ///< further ones, as attributes
+  bool tangents = false;  ///< it depends on the direction of the coordinates
 };
 
 class GltfMaterials {
@@ -30,8 +39,7 @@ class GltfMaterials {
   ObjectPtr light(int material, const GltfColours& vertices);
   /// What solids of this material absorb; null if nothing.
   ObjectPtr medium(int material);
-  /// The set of texture coordinates used by all its textures.
-  int texture_set(int material);
+  GltfSets sets(int material) const { return sets_of(of(material)); }
 
  private:
   using Key = std::pair<int, GltfColours>;
@@ -39,6 +47,7 @@ class GltfMaterials {
   const tinygltf::Material& of(int material) const;
   ObjectPtr make(const tinygltf::Material& material, const GltfColours& vertices);
   ObjectPtr make_light(const tinygltf::Material& material, const GltfColours& vertices);
+  ObjectPtr lit_model(const tinygltf::Material& material, const GltfColours& vertices);
   ObjectBuilder surface(const tinygltf::Material& material, const GltfColours& vertices);
   void set_layers(const tinygltf::Material& material, ObjectDescription& model);
   void set_transmission(const tinygltf::Material& material, ObjectDescription& model);
@@ -50,7 +59,10 @@ class GltfMaterials {
   /// Sets one channel of an image (0 to 3: R, G, B, A), times `factor`; the image counts if there is one.
   void set_number(ObjectDescription& model, const char* name, const tinygltf::TextureInfo& image, int channel,
                   double factor);
-  ObjectPtr with_normals(const tinygltf::Material& material, ObjectPtr model);
+  ObjectPtr normal_map(int texture, int set, const tinygltf::ExtensionMap& extensions, double scale);
+  void set_coat_normal(const tinygltf::Material& material, const tinygltf::Value& coat, ObjectDescription& model);
+  ObjectPtr make_texture(const tinygltf::TextureInfo& image, const GltfUse& use);
+  static GltfSets sets_of(const tinygltf::Material& material);
   /// A number or texture; nullopt if the surface is opaque.
   std::optional<Value> opacity(const tinygltf::Material& material, const GltfColours& vertices);
 
@@ -59,6 +71,7 @@ class GltfMaterials {
   tinygltf::Material default_;
   std::map<Key, ObjectPtr> models_, lights_;
   std::map<int, ObjectPtr> media_;
+  ObjectPtr base_normal_;  // of the material that is being made; null: none
 };
 
 }  // namespace covary

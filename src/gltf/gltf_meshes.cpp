@@ -131,6 +131,19 @@ void morph(GltfFile& file, const tinygltf::Primitive& primitive, std::span<const
   }
 }
 
+/// Moves tangents, whose fourth number is their side, by a matrix for each vertex.
+void turn(double* tangent, const Matrix4& m) {
+  const double given[3] = {tangent[0], tangent[1], tangent[2]};
+  for (size_t i = 0; i < 3; ++i) tangent[i] = m[i][0] * given[0] + m[i][1] * given[1] + m[i][2] * given[2];
+}
+
+/// Texture coordinates whose v points upwards; downwards in the file.
+Numbers coordinates(Primitive& primitive, int set) {
+  Numbers uvs = primitive.attribute(fmt::format("TEXCOORD_{}", set), 2);
+  for (size_t i = 1; i < uvs.size(); i += 2) uvs[i] = 1 - uvs[i];
+  return uvs;
+}
+
 /// Moves each vertex by the weighted mean of its joints; normals by its inverse transpose.
 void skin(Primitive& primitive, std::span<const Transform> joints, EmbeddedMesh& mesh) {
   const size_t n = mesh.positions.size() / 3;
@@ -156,6 +169,7 @@ void skin(Primitive& primitive, std::span<const Transform> joints, EmbeddedMesh&
                     mesh.positions.begin() + static_cast<ptrdiff_t>(3 * v + 3));
     for (size_t i = 0; i < 3; ++i)
       mesh.positions[3 * v + i] = (m[i][0] * p[0] + m[i][1] * p[1] + m[i][2] * p[2] + m[i][3]) / sums[v];
+    if (!mesh.tangents.empty()) turn(&mesh.tangents[4 * v], m);
     if (mesh.normals.empty()) continue;
     double* normal = &mesh.normals[3 * v];
     const double given[3] = {normal[0], normal[1], normal[2]};
@@ -190,7 +204,7 @@ bool read_colours(Primitive& primitive, EmbeddedMesh& mesh) {
 
 }  // namespace
 
-std::optional<GltfMesh> read_gltf_mesh(GltfFile& file, const tinygltf::Primitive& given, int texture_set,
+std::optional<GltfMesh> read_gltf_mesh(GltfFile& file, const tinygltf::Primitive& given, const GltfSets& sets,
                                        const GltfPose& pose, const std::string& what) {
   if (given.mode >= 0 && given.mode < TINYGLTF_MODE_TRIANGLES) {
     file.warn(fmt::format("{}: points and lines are left out", what));
@@ -205,8 +219,13 @@ std::optional<GltfMesh> read_gltf_mesh(GltfFile& file, const tinygltf::Primitive
   EmbeddedMesh& mesh = result.mesh;
   mesh.positions = primitive.attribute("POSITION", 3);
   mesh.normals = primitive.attribute("NORMAL", 3);
-  mesh.uvs = primitive.attribute(fmt::format("TEXCOORD_{}", texture_set), 2);
-  for (size_t i = 1; i < mesh.uvs.size(); i += 2) mesh.uvs[i] = 1 - mesh.uvs[i];  // v points downwards in the file
+  mesh.uvs = coordinates(primitive, sets.own);
+  for (const int set : sets.others) {
+    Numbers& others = mesh.pairs[fmt::format("uv{}", set)] = coordinates(primitive, set);
+    if (others.empty()) others.resize(mesh.positions.size() / 3 * 2);
+  }
+  if (sets.tangents && !mesh.normals.empty() && primitive.width("TANGENT") == 4)
+    mesh.tangents = primitive.attribute("TANGENT", 4);
   result.transparent = read_colours(primitive, mesh);
   morph(file, given, pose.weights, what, mesh);
   if (!pose.joints.empty()) skin(primitive, pose.joints, mesh);

@@ -9,6 +9,7 @@
 #include "core/transform.h"
 #include "formats/object_builder.h"
 #include "gltf/gltf_file.h"
+#include "gltf/gltf_materials.h"
 
 namespace covary {
 
@@ -24,9 +25,9 @@ struct GltfPose {
   std::span<const Transform> joints;  ///< from the mesh's space to world space; empty: no skin
 };
 
-/// The triangles of a primitive with the texture coordinates of `texture_set`; nullopt after an error, or, with a
-/// warning, if it has no triangles. Messages call it `what`.
-std::optional<GltfMesh> read_gltf_mesh(GltfFile& file, const tinygltf::Primitive& primitive, int texture_set,
+/// The triangles of a primitive with the texture coordinates of `sets`; nullopt after an error, or, with a warning, if
+/// it has no triangles. Messages call it `what`.
+std::optional<GltfMesh> read_gltf_mesh(GltfFile& file, const tinygltf::Primitive& primitive, const GltfSets& sets,
                                        const GltfPose& pose, const std::string& what);
 
 }  // namespace covary

@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "core/content_hash.h"
+#include "gltf/gltf_animation.h"
 #include "gltf/gltf_materials.h"
 #include "gltf/gltf_meshes.h"
 #include "gltf/gltf_nodes.h"
@@ -48,7 +49,6 @@ class Reader {
     for (const GltfNodes::Place& place : nodes_.places()) visit(model_.nodes[place.node], place.to_world);
     add(make_object("integrator", "path", file_.where()));
     if (!has_mesh_ && !has_camera_) file_.error("the file has neither a camera nor a mesh");
-    if (file_.is_animated()) file_.warn("animations are not read: all is where it stands before they begin");
     return scene_;
   }
 
@@ -69,7 +69,7 @@ class Reader {
     for (size_t i = 0; i < given.primitives.size(); ++i) {
       const tinygltf::Primitive& primitive = given.primitives[i];
       const std::string what = fmt::format("mesh {} '{}', primitive {}", mesh, given.name, i);
-      const auto read = read_gltf_mesh(file_, primitive, materials_.texture_set(primitive.material), pose, what);
+      const auto read = read_gltf_mesh(file_, primitive, materials_.sets(primitive.material), pose, what);
       if (!read) continue;
       auto part = make_object("shape", "ply", file_.where());
       set_property(*part, std::string(kEmbeddedData), ply_text(read->mesh));
@@ -207,14 +207,23 @@ class Reader {
 
 }  // namespace
 
-SceneXml read_scene_gltf(std::string_view bytes, const std::string& name, FileResolver& files,
-                         Diagnostics& diagnostics) {
+SceneXml read_scene_gltf(std::string_view bytes, const std::string& name, FileResolver& files, Diagnostics& diagnostics,
+                         std::optional<double> time) {
   const std::string folder = std::filesystem::path(name).parent_path().string();
   files.add_folder(folder.empty() ? "." : folder);
   GltfFile file(bytes, name, files, diagnostics);
   SceneXml result;
-  result.scene = Reader(file).read();
+  result.is_animated = !file.animations().empty();
   result.hash = hash_bytes(bytes);
+  if (file.moves_pointers())
+    file.warn("animations of materials and other properties (KHR_animation_pointer) are not read");
+  if (result.is_animated && time) {
+    move_gltf_nodes(file, *time);
+    result.hash = hash_bytes(fmt::format("{} {}", result.hash, *time));
+  } else if (result.is_animated) {
+    file.warn("is animated: all is where it stands at rest; `--frames` shows it in motion");
+  }
+  result.scene = Reader(file).read();
   return result;
 }
 

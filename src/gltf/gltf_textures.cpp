@@ -79,7 +79,22 @@ Transform uv_transform(const tinygltf::ExtensionMap& extensions) {
 
 }  // namespace
 
-ObjectPtr GltfTextures::make(int texture, const tinygltf::ExtensionMap& extensions, const GltfUse& use) {
+int gltf_texture_set(int set, const tinygltf::ExtensionMap& extensions) {
+  const tinygltf::Value* khr = find_extension(extensions, "KHR_texture_transform");
+  const int other = khr ? extension_index(*khr, "texCoord") : -1;
+  return other >= 0 ? other : set;
+}
+
+ObjectPtr GltfTextures::make(int texture, int set, const tinygltf::ExtensionMap& extensions, const GltfUse& use) {
+  const ObjectPtr bitmap = make_bitmap(texture, extensions, use);
+  set = gltf_texture_set(set, extensions);
+  if (!bitmap || set == own_set_) return bitmap;
+  const ObjectPtr coordinates =
+      make_object("texture", "mesh_attribute", file_.where(), {{"name", fmt::format("vertex_uv{}", set)}});
+  return make_object("texture", "projected", file_.where(), {{"coordinates", coordinates}, {"", bitmap}});
+}
+
+ObjectPtr GltfTextures::make_bitmap(int texture, const tinygltf::ExtensionMap& extensions, const GltfUse& use) {
   const tinygltf::Model& model = file_.model();
   if (texture < 0 || static_cast<size_t>(texture) >= model.textures.size()) {
     file_.error(fmt::format("there is no texture {}", texture));

@@ -30,10 +30,14 @@ struct GltfUse {
 class GltfTextures {
  public:
   explicit GltfTextures(GltfFile& file) : file_(file) {}
-  /// The texture with this index, with the extensions of its reference; null after an error.
-  ObjectPtr make(int texture, const tinygltf::ExtensionMap& extensions, const GltfUse& use);
+  /// The texture with this index, with the extensions of its reference, at the coordinates of a set; null after an
+  /// error.
+  ObjectPtr make(int texture, int set, const tinygltf::ExtensionMap& extensions, const GltfUse& use);
+  /// The set that meshes have as their own coordinates; they have others as attributes vertex_uvN.
+  void take_as_own(int set) { own_set_ = set; }
 
  private:
+  ObjectPtr make_bitmap(int texture, const tinygltf::ExtensionMap& extensions, const GltfUse& use);
   struct Pixels {
     int width = 0, height = 0, channels = 0;
     std::vector<uint8_t> values;
@@ -46,6 +50,10 @@ class GltfTextures {
 
   GltfFile& file_;
   std::map<int, Pixels> images_;
+  int own_set_ = 0;
 };
+
+/// The set of coordinates of a texture: KHR_texture_transform overrides it.
+int gltf_texture_set(int set, const tinygltf::ExtensionMap& extensions);
 
 }  // namespace covary

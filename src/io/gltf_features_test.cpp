@@ -259,7 +259,7 @@ TEST_F(GltfFeatures, WhatMovesIsReadPast) {
   file.scene["extensionsRequired"] = file.scene["extensionsUsed"] = {"KHR_animation_pointer", "KHR_materials_variants"};
   const LoadedScene scene = load(file);
   ASSERT_EQ(scene.warnings.size(), 1u);
-  EXPECT_TRUE(contains(scene.warnings[0], "animations are not read"));
+  EXPECT_TRUE(contains(scene.warnings[0], "(KHR_animation_pointer) are not read"));
 }
 
 #if __has_include(<meshoptimizer.h>)

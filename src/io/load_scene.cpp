@@ -32,7 +32,8 @@ class Loader {
 
   void load(std::string_view text, const std::string& name) {
     const Stopwatch watch;
-    xml_ = read_scene_file(text, name, options_.defines, files_, diagnostics_);
+    xml_ = read_scene_file(text, name, options_.defines, files_, diagnostics_, options_.time);
+    result_.is_animated = xml_.is_animated;
     is_gltf_ = is_gltf_file(name);
     sensor_ = chosen_sensor(*xml_.scene, options_.view, diagnostics_);
     jobs_.collect(*xml_.scene);

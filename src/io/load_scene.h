@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,6 +19,7 @@ struct LoadOptions {
   std::map<std::string, std::string> defines;  ///< -D name=value, overriding <default>
   bool ignore_unknown = false;                 ///< unknown plugins and parameters are warnings, see Diagnostics
   int width = 0, height = 0;                   ///< override the film size when > 0 (the crop is then dropped)
+  std::optional<double> time;                  ///< of a glTF file's animations, in seconds; nullopt: at rest
   SceneView view;                              ///< camera and surroundings; default: as in the file
   /// Creates the integrator from the scene's <integrator> element, so that its errors are reported with all others. If
   /// empty, the element is only recorded in LoadedScene::integrator_type.
@@ -45,6 +47,7 @@ struct LoadedScene {
   std::vector<std::string> warnings;
   std::vector<std::string> files;  ///< paths of all files referenced by the scene's file that were read
   double read_seconds = 0;         ///< parsing and reading files; excludes Scene::build_seconds()
+  bool is_animated = false;        ///< by the file itself (glTF): it must be loaded again for another time
   std::string content_hash;        ///< hex; of the XML, defines and all files read; if moved, also camera and time
   std::string files_hash;          ///< the same, never with camera and time
 };

@@ -10,7 +10,7 @@ namespace covary {
 
 SceneXml read_scene_file(std::string_view text, const std::string& name,
                          const std::map<std::string, std::string>& defines, FileResolver& files,
-                         Diagnostics& diagnostics) {
+                         Diagnostics& diagnostics, std::optional<double> time) {
   SceneXml result;
   const bool pbrt = is_pbrt_file(name), gltf = is_gltf_file(name);
   if ((pbrt || gltf) && !defines.empty())
@@ -19,7 +19,7 @@ SceneXml read_scene_file(std::string_view text, const std::string& name,
   if (pbrt)
     result = read_scene_pbrt(text, name, files, diagnostics);
   else if (gltf)
-    result = read_scene_gltf(text, name, files, diagnostics);
+    result = read_scene_gltf(text, name, files, diagnostics, time);
   else
     result = read_scene_xml(text, name, defines, files, diagnostics);
   if (result.scene) return result;

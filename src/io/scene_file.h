@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -18,10 +19,11 @@ inline bool is_scene_file(std::string_view name) {
   return name.ends_with(".xml") || is_pbrt_file(name) || is_gltf_file(name);
 }
 
-/// Reads the text of a scene file in the format given by its name; see read_scene_xml(). Throws Error(kInput) with all
+/// Reads the text of a scene file in the format given by its name; see read_scene_xml(). `time` as for
+/// read_scene_gltf(). Throws Error(kInput) with all
 /// problems if no scene results, and Error(kUsage) for defines that the format cannot use.
 SceneXml read_scene_file(std::string_view text, const std::string& name,
                          const std::map<std::string, std::string>& defines, FileResolver& files,
-                         Diagnostics& diagnostics);
+                         Diagnostics& diagnostics, std::optional<double> time = std::nullopt);
 
 }  // namespace covary

@@ -80,6 +80,10 @@ MeshData place_mesh(MeshFile file, const MeshPlacement& placement, size_t& n_rep
     for (Vec2& uv : mesh.uvs) uv.y = 1 - uv.y;
   for (Vec2& uv : mesh.uvs)
     if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) uv = {};
+  for (MeshTangent& t : mesh.tangents) {
+    if (moved) t = t.moved(to_world);
+    if (!is_finite(t.along)) t.along = {};
+  }
   for (Spectrum& c : mesh.colours)
     if (!is_finite(c)) c = Spectrum(0);
   mesh.flip_normals = placement.flip_normals;

@@ -23,12 +23,12 @@ struct MeshFile {
   std::vector<uint32_t> points;
 };
 
-/// Stanford PLY: ascii, binary little and big endian. Polygons become triangles (polygon.h). Reads x y z, nx
-/// ny nz, texture coordinates ("u v", "s t", "texture_u texture_v"), colours ("r g b", "red green blue", "color_r …";
-/// integers are divided by the maximum of their type) and those of the requested `attributes` that are present; skips
-/// everything else. An attribute "vertex_NAME" or "face_NAME" is a property "NAME" or "NAME_0" (or "NAME_1", "NAME_x",
-/// "NAME_r"), or three, "NAME_0 NAME_1 NAME_2", "NAME_1 …", "NAME_x …", "NAME_r …"; "color" also "r g b", "red green
-/// blue".
+/// Stanford PLY: ascii, binary little and big endian. Polygons become triangles (polygon.h). Reads x y z, nx ny nz,
+/// texture coordinates ("u v", "s t", "texture_u texture_v"), colours ("r g b", "red green blue", "color_r …"; integers
+/// are divided by the maximum of their type), tangents ("tx ty tz tw") and those of the requested `attributes` that are
+/// present; skips everything else. An attribute "vertex_NAME" or "face_NAME" is a property "NAME" or "NAME_0" (or
+/// "NAME_1", "NAME_x", "NAME_r"), or three, "NAME_0 NAME_1 NAME_2", "NAME_1 …", "NAME_x …", "NAME_r …"; "color" also "r
+/// g b", "red green blue".
 MeshFile read_ply(std::span<const std::byte> bytes, std::span<const std::string> attributes = {});
 
 /// Wavefront OBJ: v, vt, vn, f (polygons as in PLY; negative indices count from the end); other statements are skipped.

@@ -16,7 +16,7 @@ inline size_t size_of(PlyType type) {
 }
 
 /// What a vertex property holds; kSkip: unused.
-enum PlySlot : int8_t { kX, kY, kZ, kNx, kNy, kNz, kU, kV, kR, kG, kB, kSlots, kSkip = -1 };
+enum PlySlot : int8_t { kX, kY, kZ, kNx, kNy, kNz, kU, kV, kR, kG, kB, kTx, kTy, kTz, kTw, kSlots, kSkip = -1 };
 
 struct PlyProperty {
   std::string name;

@@ -24,7 +24,7 @@ static_assert(std::endian::native == std::endian::little);
 
 /// Assigns slots to the vertex properties and records which groups are complete.
 struct Contents {
-  bool normals = false, uvs = false, colours = false;
+  bool normals = false, uvs = false, colours = false, tangents = false;
 };
 Contents assign_slots(PlyElement& vertex) {
   const auto find = [&](std::string_view name) -> PlyProperty* {
@@ -44,6 +44,7 @@ Contents assign_slots(PlyElement& vertex) {
   contents.normals = assign({"nx", "ny", "nz"}, kNx);
   contents.uvs = assign({"texture_u", "texture_v"}, kU) || assign({"s", "t"}, kU) || assign({"u", "v"}, kU) ||
                  assign({"texture_s", "texture_t"}, kU);
+  contents.tangents = assign({"tx", "ty", "tz", "tw"}, kTx);
   contents.colours = assign({"r", "g", "b"}, kR) || assign({"red", "green", "blue"}, kR) ||
                      assign({"color_r", "color_g", "color_b"}, kR) || assign({"color_x", "color_y", "color_z"}, kR) ||
                      assign({"color_0", "color_1", "color_2"}, kR) || assign({"color_1", "color_2", "color_3"}, kR);
@@ -164,6 +165,7 @@ void allocate(MeshData& mesh, const Contents& contents, size_t n) {
   if (contents.normals) mesh.normals.resize(n);
   if (contents.uvs) mesh.uvs.resize(n);
   if (contents.colours) mesh.colours.resize(n);
+  if (contents.tangents) mesh.tangents.resize(n);
 }
 
 void store(MeshData& mesh, const Contents& contents, size_t i, const float* v) {
@@ -171,6 +173,7 @@ void store(MeshData& mesh, const Contents& contents, size_t i, const float* v) {
   if (contents.normals) mesh.normals[i] = {v[kNx], v[kNy], v[kNz]};
   if (contents.uvs) mesh.uvs[i] = {v[kU], v[kV]};
   if (contents.colours) mesh.colours[i] = {v[kR], v[kG], v[kB]};
+  if (contents.tangents) mesh.tangents[i] = {{v[kTx], v[kTy], v[kTz]}, v[kTw] < 0 ? -1.0f : 1.0f};
 }
 
 [[noreturn]] void fail_in(const PlyElement& element, uint64_t index) {
@@ -245,7 +248,8 @@ void read_vertices(Body& body, const PlyElement& element, const Contents& conten
         MeshAttribute& a = mesh.attributes[p.attribute];
         a.values[i * a.channels + p.channel] = attribute_value(p, a, value);
       }
-      if (p.slot != kSkip) values[p.slot] = static_cast<float>(value) * (p.slot >= kR ? colour_scale(p.type) : 1);
+      if (p.slot != kSkip)
+        values[p.slot] = static_cast<float>(value) * (p.slot >= kR && p.slot <= kB ? colour_scale(p.type) : 1);
     }
     store(mesh, contents, i, values);
   }

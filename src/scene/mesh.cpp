@@ -23,6 +23,7 @@ void check_length(const char* what, size_t length, size_t n_vertices) {
 TriangleMesh::TriangleMesh(MeshData data)
     : triangles_(std::move(data.triangles)),
       colours_(std::move(data.colours)),
+      tangents_(std::move(data.tangents)),
       attributes_(std::move(data.attributes)),
       has_normals_(!data.normals.empty()),
       has_uvs_(!data.uvs.empty()) {
@@ -30,6 +31,7 @@ TriangleMesh::TriangleMesh(MeshData data)
   check_length("normals", data.normals.size(), n);
   check_length("texture coordinates", data.uvs.size(), n);
   check_length("vertex colours", colours_.size(), n);
+  check_length("tangents", tangents_.size(), n);
 
   for (const MeshAttribute& a : attributes_)
     if (a.values.size() != (a.per_face ? triangles_.size() : n) * static_cast<size_t>(a.channels))
@@ -186,7 +188,21 @@ void TriangleMesh::fill(const Ray& /*ray*/, SurfaceHit& hit, bool with_derivativ
     hit.dp_du = (e1 * uv2.y - e2 * uv1.y) * scale;
     hit.dp_dv = (e2 * uv1.x - e1 * uv2.x) * scale;
   }
+  if (!tangents_.empty()) follow_tangents(n, hit);
   make_in_place(hit.frame, [&] { return Frame::from_tangent(n, hit.dp_du); });
+}
+
+void TriangleMesh::follow_tangents(const Vec3& n, SurfaceHit& hit) const {
+  const auto& t = triangles_[hit.primitive];
+  const float b1 = hit.barycentric.x, b2 = hit.barycentric.y;
+  Vec3 along = tangents_[t[0]].along * (1 - b1 - b2) + tangents_[t[1]].along * b1 + tangents_[t[2]].along * b2;
+  along = along - n * dot(n, along);
+  const float l = length(along);
+  if (!(l > 0)) return;
+  along *= 1 / l;
+  const float du = length(hit.dp_du), dv = length(hit.dp_dv);
+  hit.dp_du = along * (du > 0 ? du : 1);
+  hit.dp_dv = cross(n, along) * ((dv > 0 ? dv : 1) * tangents_[t[0]].side);
 }
 
 AreaSample TriangleMesh::sample_area(Vec2 u, float u_primitive) const {
@@ -239,6 +255,7 @@ std::shared_ptr<Shape> TriangleMesh::transformed(const Transform& to_world) cons
   MeshData data;
   data.triangles = triangles_;
   data.colours = colours_;
+  for (const MeshTangent& tangent : tangents_) data.tangents.push_back(tangent.moved(to_world));
   data.attributes = attributes_;
   for (MeshAttribute& a : data.attributes)
     if (a.per_face) a.values.resize(triangles_.size() * static_cast<size_t>(a.channels));

@@ -20,12 +20,20 @@ struct MeshAttribute {
   std::vector<float> values;
 };
 
+/// A vertex's direction of dp/du, which takes the place of that of its texture coordinates in shading frames.
+struct MeshTangent {
+  Vec3 along;      ///< any length; zero: none
+  float side = 1;  ///< 1: dp/dv is towards normal x tangent; -1: away from it
+  MeshTangent moved(const Transform& to) const { return {to.vector(along), to.flips_handedness() ? -side : side}; }
+};
+
 /// Vertex and index arrays of a triangle mesh in world space (or in the space of its shape group).
 struct MeshData {
   std::vector<Vec3> positions;
-  std::vector<Vec3> normals;      ///< unit, one per vertex, or empty: flat shading
-  std::vector<Vec2> uvs;          ///< one per vertex, or empty
-  std::vector<Spectrum> colours;  ///< one per vertex, or empty
+  std::vector<Vec3> normals;          ///< unit, one per vertex, or empty: flat shading
+  std::vector<Vec2> uvs;              ///< one per vertex, or empty
+  std::vector<Spectrum> colours;      ///< one per vertex, or empty
+  std::vector<MeshTangent> tangents;  ///< one per vertex, or empty
   std::vector<std::array<uint32_t, 3>> triangles;
   std::vector<MeshAttribute> attributes;  ///< other than vertex colours
   bool flip_normals = false;              ///< reverse geometric and shading normals
@@ -84,6 +92,7 @@ class TriangleMesh final : public Shape {
   LargeVector<Vertex> vertices_;
   std::vector<std::array<uint32_t, 3>> triangles_;
   std::vector<Spectrum> colours_;
+  std::vector<MeshTangent> tangents_;
   std::vector<MeshAttribute> attributes_;
   Bounds3 bounds_;
   bool has_normals_ = false, has_uvs_ = false;
@@ -102,6 +111,8 @@ class TriangleMesh final : public Shape {
   /// Whether all vertex normals of the triangle, with normal `n`, are on the front (1) or on the back (-1); else 0.
   int front_side(const std::array<uint32_t, 3>& triangle, const Vec3& n) const;
   AreaSample sample_facet(uint32_t triangle, Vec2 u) const;
+  /// Turns the derivatives of a hit, whose frame has the normal `n`, to the vertices' tangents.
+  void follow_tangents(const Vec3& n, SurfaceHit& hit) const;
   Discrete areas_;
   float inverse_area_ = 0;
 

@@ -23,7 +23,8 @@ void declare(Settings& s, SequenceSettings& v) {
   s.text("camera-path", v.camera_path, "FILE", "Position of the camera in each frame (JSON)",
          {.names = OptionNames::kFile, .effect = OptionEffect::kSamples});
   s.real("fps", v.frames_per_second, {.low = 0.01, .high = 1000}, NumberWord{"auto", 0.0},
-         "Frame n shows the time n / `fps` of the scene's animations and the camera path; auto: the path's, or 1",
+         "Frame n shows the time n / `fps` of the scene's animations and the camera path; auto: the path's, or 24 for "
+         "glTF, 1 for others",
          {.effect = OptionEffect::kSamples});
   s.on_off("history", v.history,
            "Mix in the previous frame, moved to the current positions, where held-out samples prefer it");

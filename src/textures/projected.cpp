@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `projected`: a texture at coordinates that depend on the position in space, pbrt's texture mappings.
+// `projected`: a texture at coordinates that depend on the position in space, pbrt's texture mappings, or that another
+// texture gives.
 //
 // | parameter | type      | default   | meaning                                                                   |
 // |-----------|-----------|-----------|---------------------------------------------------------------------------|
@@ -9,6 +10,7 @@
 // | v1, v2    | vector    | x, y      | `planar`                                                                  |
 // | offset    | vector    | 0         | `planar`; z has no meaning                                                |
 // | to_world  | transform | identity  | from the texture's space, in which p is measured                          |
+// | coordinates | texture |           | instead of a mapping: (s, t) is red and green of this texture             |
 #include <cmath>
 
 #include "textures/gradient.h"
@@ -17,20 +19,22 @@
 namespace covary {
 namespace {
 
-enum class Mapping { kPlanar, kCylindrical, kSpherical };
+enum class Mapping { kPlanar, kCylindrical, kSpherical, kTexture };
 
 class Projected final : public Texture {
  public:
-  Projected(TexturePtr nested, Parameters& p)
+  Projected(TexturePtr nested, TexturePtr coordinates, Parameters& p)
       : nested_(std::move(nested)),
         to_texture_(p.get_transform("to_world").inverse()),
         v1_(p.get_vec3("v1", {1, 0, 0})),
         v2_(p.get_vec3("v2", {0, 1, 0})),
-        offset_(p.get_vec3("offset", {0, 0, 0})) {
+        offset_(p.get_vec3("offset", {0, 0, 0})),
+        coordinates_(std::move(coordinates)) {
     const std::string mapping = p.get_choice("mapping", "planar", {"planar", "cylindrical", "spherical"});
     mapping_ = mapping == "planar"        ? Mapping::kPlanar
                : mapping == "cylindrical" ? Mapping::kCylindrical
                                           : Mapping::kSpherical;
+    if (coordinates_) mapping_ = Mapping::kTexture;
   }
   Spectrum eval(const SurfaceHit& hit) const override { return nested_->eval(mapped(hit)); }
   float eval_1(const SurfaceHit& hit) const override { return nested_->eval_1(mapped(hit)); }
@@ -41,6 +45,11 @@ class Projected final : public Texture {
  private:
   SurfaceHit mapped(const SurfaceHit& hit) const {
     SurfaceHit result = hit;
+    if (mapping_ == Mapping::kTexture) {
+      const Spectrum at = coordinates_->eval(hit);
+      result.uv = {at.r, at.g};
+      return result;
+    }
     const Vec3 p = to_texture_.point(hit.p);
     if (mapping_ == Mapping::kPlanar) {
       result.uv = {dot(p, v1_) + offset_.x, dot(p, v2_) + offset_.y};
@@ -56,14 +65,16 @@ class Projected final : public Texture {
   TexturePtr nested_;
   Transform to_texture_;
   Vec3 v1_, v2_, offset_;
+  TexturePtr coordinates_;
   Mapping mapping_;
 };
 
 }  // namespace
 
 std::shared_ptr<Texture> make_projected(Parameters& p) {
+  const TexturePtr coordinates = p.find_texture("coordinates");
   const auto nested = p.children<Texture>("texture");
-  if (nested.size() == 1) return std::make_shared<Projected>(nested.front(), p);
+  if (nested.size() == 1) return std::make_shared<Projected>(nested.front(), coordinates, p);
   p.error("needs exactly one nested texture, but has " + std::to_string(nested.size()));
   return nullptr;
 }

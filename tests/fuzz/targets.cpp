@@ -70,7 +70,7 @@ bool pbrt(Bytes input) {
 }
 bool gltf(Bytes input) {
   LoadOptions options;
-  options.view.environment = "auto";
+  options.view.environment = "auto", options.time = 0.5;
   return accepts([&] { load_scene_text(text_of(input), "/no/such/folder/scene.gltf", options); });
 }
 bool tensor(Bytes input) {
