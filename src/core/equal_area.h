@@ -2,9 +2,9 @@
 // The map of the unit square onto the sphere of directions that keeps areas, as used by pbrt-v4: Clarberg's octahedral
 // mapping (2008).
 //
-// With (x, y) in [-1, 1]^2 from the square's upper left corner, s = |x| + |y|, r = min(s, 2 - s) and phi = (pi / 4) (1 +
-// (|y| - |x|) / r) in the first quadrant: |z| = 1 - r^2, z >= 0 inside the diamond s <= 1, and the direction's x and y
-// have the signs of (x, y).
+// With (x, y) in [-1, 1]^2 from the square's upper left corner, s = |x| + |y|, r = min(s, 2 - s) and phi = (pi / 4)
+// (1 + (|y| - |x|) / r) in the first quadrant: |z| = 1 - r^2, z >= 0 inside the diamond s <= 1, and the direction's x
+// and y have the signs of (x, y).
 #pragma once
 
 #include "core/vec.h"
