@@ -146,6 +146,20 @@ void drop(ObjectDescription& object, std::initializer_list<std::string_view> nam
     }
 }
 
+/// Mitsuba 0.x scales colours above 1 down to conserve energy.
+void conserve_energy(ObjectDescription& object, Diagnostics& diagnostics) {
+  for (Property& property : object.properties) {
+    ColourValue* colour = std::get_if<ColourValue>(&property.value);
+    if (!colour || !(property.name.ends_with("reflectance") || property.name.ends_with("transmittance"))) continue;
+    const float most = max_component(colour->rgb);
+    if (!(most > 1 && std::isfinite(most))) continue;
+    diagnostics.warn(property.where, fmt::format("parameter '{}' of bsdf '{}' is {:.4g} times too bright: it is scaled "
+                                                 "down, as in Mitsuba 0.x",
+                                                 property.name, object.type, most));
+    colour->rgb = colour->rgb / most;
+  }
+}
+
 }  // namespace
 
 std::string snake_case(std::string_view name) {
@@ -163,10 +177,12 @@ std::string snake_case(std::string_view name) {
 }
 
 void upgrade_object(ObjectDescription& object, Diagnostics& diagnostics) {
+  for (char& c : object.type) c = to_lower(c);  // on Windows, the case of a plugin's name did not matter
   for (Property& property : object.properties) property.name = snake_case(property.name);
   upgrade_uv(object);
   if (object.kind == "bsdf") {
     upgrade_distribution(object, diagnostics);
+    conserve_energy(object, diagnostics);
     if (object.type == "diffuse") rename(object, "diffuse_reflectance", "reflectance");
     if (object.type == "conductor" || object.type == "roughconductor") upgrade_conductor(object);
   } else if (object.kind == "texture") {

@@ -197,6 +197,21 @@ TEST(XmlReader, TurnsOldTextureParametersIntoTodays) {
   EXPECT_EQ(child(r, 4).properties[0].name, "ext_eta");  // kept: it has no current equivalent
 }
 
+TEST(XmlReader, ScalesColoursOfOldFilesThatMakeLight) {
+  const Read r = read_old(
+      "<bsdf type=\"Phong\"><rgb name=\"specularReflectance\" value=\"4, 2, 1\"/><rgb name=\"diffuseReflectance\" "
+      "value=\"1, 0.5, 0\"/></bsdf>");
+  EXPECT_EQ(r.errors, "no error");
+  EXPECT_EQ(child(r).type, "phong");  // the case of plugins' names did not matter everywhere
+  EXPECT_EQ(std::get<ColourValue>(child(r).properties[0].value).rgb, Spectrum(1, 0.5f, 0.25f));
+  EXPECT_EQ(std::get<ColourValue>(child(r).properties[1].value).rgb, Spectrum(1, 0.5f, 0));
+  ASSERT_EQ(r.warnings.size(), 1u);
+  EXPECT_EQ(
+      r.warnings[0],
+      "scene.xml:2:20: parameter 'specular_reflectance' of bsdf 'phong' is 4 times too bright: it is scaled down, "
+      "as in Mitsuba 0.x");
+}
+
 TEST(XmlReader, WarnsAboutWhatItDropsFromOldFiles) {
   const Read r = read_old(
       "<film type=\"ldrfilm\"><float name=\"gamma\" value=\"2.2\"/><integer name=\"width\" value=\"3\"/></film>\n"
@@ -209,7 +224,7 @@ TEST(XmlReader, WarnsAboutWhatItDropsFromOldFiles) {
   ASSERT_EQ(r.warnings.size(), 3u);
   EXPECT_EQ(r.warnings[0], "scene.xml:2:1: film 'ldrfilm' is read as 'hdrfilm'");
   EXPECT_EQ(r.warnings[1],
-            "scene.xml:3:73: parameter 'sample_direct' of integrator 'path' has no counterpart today and is ignored");
+            "scene.xml:3:69: parameter 'sample_direct' of integrator 'path' has no counterpart today and is ignored");
   EXPECT_EQ(r.warnings[2],
             "scene.xml:3:25: parameter 'strict_normals' of integrator 'path' has no counterpart today and is ignored");
 }
