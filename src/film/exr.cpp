@@ -6,7 +6,6 @@
 #include <OpenEXR/ImfInputPart.h>
 #include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfMultiPartInputFile.h>
-#include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfStandardAttributes.h>
 #include <OpenEXR/ImfStringAttribute.h>
@@ -23,6 +22,7 @@
 
 #include "core/parallel.h"
 #include "film/exr_library.h"
+#include "film/luminance_chroma.h"
 #include "imageio/exr_image.h"
 
 namespace covary {
@@ -102,66 +102,7 @@ void assign_views(const Imf::Header& header, std::vector<ExrFile::Channel>& chan
 
 const char* type_name(ExrPlane::Type type) { return type == ExrPlane::Type::kUint ? "uint" : "float"; }
 
-Checksums checksums_of(const ImagePlace& place, const std::map<std::string, std::string>& attributes,
-                       std::span<const ExrPlane> planes) {
-  std::map<std::string, const ExrPlane*> by_name;
-  for (const ExrPlane& plane : planes) by_name[plane.name] = &plane;
-  std::vector<const ExrPlane*> sorted;
-  std::vector<std::string> names;
-  for (const auto& [name, plane] : by_name) {
-    sorted.push_back(plane);
-    names.push_back(name + " " + type_name(plane->type));
-  }
-  Checksums sums{crc_of_header(exr_shape_text(place, names), attributes), std::vector<uint32_t>(sorted.size())};
-  const size_t n_pixels = static_cast<size_t>(place.window.width) * static_cast<size_t>(place.window.height);
-  parallel_for(sorted.size(), [&](size_t i) {
-    sums.channels[i] = crc_of_values(0, sorted[i]->base, n_pixels, sorted[i]->pixel_stride);
-  });
-  return sums;
-}
-
 }  // namespace
-
-void add_image_planes(const std::string& name, Image& image, std::vector<ExrPlane>& planes) {
-  if (image.channels == 1) {
-    planes.push_back({name, ExrPlane::Type::kFloat, image.data.data(), sizeof(float)});
-    return;
-  }
-  COVARY_CHECK(image.channels == 3, "an image of one or three channels");
-  const bool is_vector = name == "N" || name == "P" || name == "DenoisingNormal" || name == "Motion";
-  const std::string components = is_vector ? "XYZ" : "RGB";
-  for (size_t c = 0; c < 3; ++c)
-    planes.push_back({(name.empty() ? "" : name + ".") + components[c], ExrPlane::Type::kFloat, image.data.data() + c,
-                      3 * sizeof(float)});
-}
-
-void write_exr(const std::string& path, const ImagePlace& place, const std::map<std::string, std::string>& attributes,
-               std::span<const ExrPlane> planes, ExrCompression compression) {
-  prepare_exr_library();
-  const CropWindow& w = place.window;
-  const Imath::Box2i window({w.x, w.y}, {w.x + w.width - 1, w.y + w.height - 1});
-  Imf::Header header(Imath::Box2i({0, 0}, {place.frame_width - 1, place.frame_height - 1}), window);
-  header.compression() = compression == ExrCompression::kZip ? Imf::ZIP_COMPRESSION : Imf::NO_COMPRESSION;
-  for (const auto& [key, value] : attributes) header.insert(key, Imf::StringAttribute(value));
-  header.insert(kChecksums, Imf::StringAttribute(checksums_of(place, attributes, planes).text()));
-  Imf::FrameBuffer pixels;
-  for (const ExrPlane& plane : planes) {
-    header.channels().insert(plane.name, Imf::Channel(exr_pixel_type(plane)));
-    pixels.insert(plane.name, exr_slice(plane, window));
-  }
-  OutputFile file(path);
-  try {
-    ExrStream stream(file, path);
-    Imf::OutputFile exr(stream, header);
-    exr.setFrameBuffer(pixels);
-    exr.writePixels(w.height);
-  } catch (const Error&) {
-    throw;
-  } catch (const std::exception& error) {
-    throw Error(ErrorCode::kIo, fmt::format("cannot write {}: {}", path, error.what()));
-  }
-  file.commit();
-}
 
 struct ExrFile::Handle {
   explicit Handle(const std::string& path) : file(path.c_str()) {}
@@ -169,7 +110,12 @@ struct ExrFile::Handle {
   Imath::Box2i window;                                       // of place_
   bool has_pixels = false;                                   // in any part so far
   std::map<std::string, std::pair<int, std::string>> parts;  // channel -> part, name in the part
+  std::unique_ptr<LuminanceChroma> luminance_chroma;         // gives R, G and B, which are of no part
 };
+
+namespace {
+constexpr int kNoPart = -1;
+}  // namespace
 
 ExrFile::~ExrFile() = default;
 
@@ -187,6 +133,11 @@ ExrFile::ExrFile(const std::string& path, ChecksumPolicy checksums, bool unreada
   std::vector<int> parts(static_cast<size_t>(handle_->file.parts()));
   std::iota(parts.begin(), parts.end(), 0);
   for (const int part : parts) add_part(part), add_attributes(part, checksums);
+  if (has_luminance_chroma(handle_->file.header(0).channels()) && parts.size() == 1) {
+    handle_->luminance_chroma = std::make_unique<LuminanceChroma>(path);
+    for (const char* name : {"R", "G", "B"})
+      channels_.push_back({name, "half", ""}), handle_->parts[name] = {kNoPart, name};
+  }
   if (channels_.empty() && !(unreadable_too && !unreadable_.empty()))
     fail(path, unreadable_.empty() ? "an EXR file without channels"
                                    : fmt::format("no channels that can be read: {} ({}); render or flatten it with one "
@@ -209,9 +160,12 @@ void ExrFile::add_part(int part) {
     const Imf::Channel& channel = it.channel();
     std::string full = it.name(), type = exr_type_name(channel.type);
     if (!full.starts_with(prefix)) full.insert(0, prefix);
+    const bool is_luminance = full == "Y" && has_luminance_chroma(header.channels());
     const bool is_subsampled = channel.xSampling != 1 || channel.ySampling != 1;
-    if (is_deep || is_subsampled) {
-      type += is_deep ? ", deep" : fmt::format(", {} x {} sub-sampled", channel.xSampling, channel.ySampling);
+    if (is_deep || is_subsampled || is_luminance) {
+      type += is_deep         ? ", deep"
+              : is_subsampled ? fmt::format(", {} x {} sub-sampled", channel.xSampling, channel.ySampling)
+                              : ", luminance";
       unreadable_.push_back({full, type, view});
       continue;
     }
@@ -297,6 +251,7 @@ std::vector<uint32_t> ExrFile::checksums_of(std::span<const std::string> channel
 void ExrFile::check_pixels() const {
   double file_values = 0, least_bytes = 0, memory = 0;
   for (const auto& [name, where] : handle_->parts) {
+    if (where.first == kNoPart) continue;
     const Imf::Header& header = handle_->file.header(where.first);
     const Imath::Box2i& window = header.dataWindow();
     const double n_pixels =
@@ -350,6 +305,10 @@ void ExrFile::read_rows(std::span<const ExrPlane> planes, int first_row, int n_r
   }
   try {
     for (const auto& [part, of_part] : by_part) {
+      if (part == kNoPart) {
+        handle_->luminance_chroma->read_rows(of_part, rows.min.y, n_rows);
+        continue;
+      }
       if (!(handle_->file.header(part).dataWindow() == handle_->window)) {
         read_from_other_window(part, of_part, first_row, n_rows);
         continue;

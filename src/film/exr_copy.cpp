@@ -23,6 +23,7 @@
 #include <optional>
 
 #include "film/exr_library.h"
+#include "film/luminance_chroma.h"
 
 namespace covary {
 namespace {
@@ -71,7 +72,8 @@ class Copy {
   }
 
   void write(const std::string& path) {
-    if (has_one_window()) parts_[picture_part()].header.insert(kChecksums, Imf::StringAttribute(checksums().text()));
+    if (can_have_checksums())
+      parts_[picture_part()].header.insert(kChecksums, Imf::StringAttribute(checksums().text()));
     OutputFile output(path);
     try {
       ExrStream stream(output, path);
@@ -111,7 +113,8 @@ class Copy {
     const Imf::ChannelList& channels = in_.header(n).channels();
     for (auto it = channels.begin(); it != channels.end(); ++it) {
       const std::string name = full_name(prefix, it.name());
-      if (it.channel().xSampling != 1 || it.channel().ySampling != 1) {
+      const bool is_luminance = name == "Y" && has_luminance_chroma(channels);
+      if (is_luminance || it.channel().xSampling != 1 || it.channel().ySampling != 1) {
         part.subsampled.emplace_back(it.name());
         continue;
       }
@@ -179,9 +182,11 @@ class Copy {
     }
   }
 
-  /// Whether all parts have the window of the planes, which checksums are of.
-  bool has_one_window() const {
+  /// Whether all parts have the window of the planes, which checksums are of, and channels whose values are read as
+  /// they are.
+  bool can_have_checksums() const {
     return std::all_of(parts_.begin(), parts_.end(), [&](const Part& part) {
+      if (part.is_same && has_luminance_chroma(part.header.channels())) return false;
       return part.is_deep() || part.header.dataWindow() == window_of_planes(part);
     });
   }
@@ -197,8 +202,10 @@ class Copy {
     if (part.is_tiled() && part.header.tileDescription().mode != Imf::ONE_LEVEL)
       lost_.push_back(
           fmt::format("{}: smaller levels (mip maps) are not kept, since they show the old image", source_));
+    const bool is_replaced = has_luminance_chroma(in_.header(part.source).channels());  // by R, G and B
     for (const std::string& name : part.subsampled)
-      lost_.push_back(fmt::format("{}: the channel {} is not kept, since it is sub-sampled", source_, name));
+      if (!is_replaced)
+        lost_.push_back(fmt::format("{}: the channel {} is not kept, since it is sub-sampled", source_, name));
     part.header.erase("tiles");
     if (part.header.hasType()) part.header.setType(Imf::SCANLINEIMAGE);
     part.header.lineOrder() = Imf::INCREASING_Y;

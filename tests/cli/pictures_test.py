@@ -278,7 +278,7 @@ class Layers(PicturesTest):
 
 
 class Info(PicturesTest):
-    def test_channels_that_other_commands_cannot_read(self):
+    def test_luminance_and_chroma(self):
         """Luminance with chroma of half the size; OpenEXR's layout of sub-sampled channels."""
         listing = b"".join(name + b"\0" + struct.pack("<iB3xii", 2, 0, step, step)
                            for name, step in ((b"BY", 2), (b"RY", 2), (b"Y", 1)))
@@ -294,8 +294,17 @@ class Info(PicturesTest):
             table, at = table + struct.pack("<Q", at), at + len(row)
         self.write("yc.exr", head + table + b"".join(rows))
         said = self.good("info", "yc.exr").stdout
-        self.assertIn("channels\n  Y (float)\nchannels that other commands cannot read\n"
-                      "  BY RY (float, 2 x 2 sub-sampled)\n", said)
+        self.assertIn("channels\n  R G B (half)\nchannels that other commands cannot read\n"
+                      "  BY RY Y (float, 2 x 2 sub-sampled, float, luminance)\n", said)
+        self.good("convert", "yc.exr", "o.exr", "--exposure", "1", "--overwrite")
+        self.good("convert", "yc.exr", "same.exr")
+        self.assertEqual(self.good("info", "same.exr").stdout[8:40], said[6:38])
+        red = 0.5 + 0.5 * 0.5  # Y + Y RY
+        green = (0.5 - 0.2126 * red - 0.0722 * red) / 0.7152
+        for name, value in (("R", red), ("G", green), ("B", red)):
+            for found in self.read()[name]:
+                self.assertAlmostEqual(found, 2 * value, delta=2e-3)
+        self.assertEqual(set(self.read()), set("RGB"))
 
     def test_parts_of_different_compression(self):
         """Of which the first could not hold what the second does."""
