@@ -5,7 +5,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -14,80 +13,21 @@
 #include <string_view>
 #include <thread>
 
-#include "combine/grouped_file.h"
-#include "combine/grouped_source.h"
 #include "core/error.h"
 #include "core/number_text.h"
 #include "core/printable.h"
 #include "core/stopwatch.h"
 #include "declared_options.h"
-#include "estimators/mean.h"
 #include "film/image_file.h"
-#include "imageio/exr_image.h"
+#include "motion_checks.h"
+#include "numbers.h"
 #include "sequences/frame_names.h"
+#include "settled_files.h"
 
 namespace covary {
 namespace {
 
 [[noreturn]] void usage(const std::string& message) { throw Error(ErrorCode::kUsage, message); }
-
-/// A fault of the whole sequence, not of one frame.
-class WrongSequence : public Error {
- public:
-  explicit WrongSequence(const std::string& message) : Error(ErrorCode::kInput, message) {}
-};
-
-/// If the motion does not match, the signs of another convention with which it does; nullopt if there are none.
-std::optional<std::array<float, 2>> better_signs(const Image& before, const Image& now, const MotionLayers& motion,
-                                                 double fit) {
-  constexpr double kClearly = 0.95;
-  std::optional<std::array<float, 2>> best;
-  for (const std::array<float, 2> signs : {std::array{-1.0f, -1.0f}, {1.0f, -1.0f}, {-1.0f, 1.0f}}) {
-    MotionLayers turned = motion;
-    for (size_t i = 0; i < turned.motion.data.size(); ++i)
-      if (i % 3 < 2) turned.motion.data[i] *= signs[i % 3];
-    const double fit_of_turned = misfit(before, now, turned);
-    if (fit_of_turned < kClearly * fit) fit = fit_of_turned / kClearly, best = signs;
-  }
-  return best;
-}
-
-/// Motion that explains less of the changes than no motion, or than motion with other signs, is wrong. (Warping a noisy
-/// image by fractions of pixels smooths it, so any motion may fit better than none.)
-void check_motion(const std::string& before, const std::string& now, const std::string& layer,
-                  const MotionLayers& motion) {
-  const auto picture = [&](const std::string& path) {
-    const GroupedFile file({path}, layer);
-    const GroupedSource source = source_of(file);
-    return mean_of_groups(source.all()).estimate;
-  };
-  const Image image_before = picture(before), image_now = picture(now);
-  const double fit = misfit(image_before, image_now, motion);
-  const std::optional<std::array<float, 2>> signs = better_signs(image_before, image_now, motion, fit);
-  if (fit <= 1 && !signs) return;
-  const std::string instead =
-      signs ? fmt::format("; multiplied by {},{} (--motion-scale) it fits better", (*signs)[0], (*signs)[1]) : "";
-  throw WrongSequence(
-      fmt::format("'{}': its motion does not match '{}': after warping, the difference is {:.2f} times that "
-                  "without motion{}. Expected are pixels to the right and down, from a pixel to its point's "
-                  "position in the previous frame; see --motion-scale, or --no-history",
-                  now, before, fit, instead));
-}
-
-/// Frames with the same seed share errors, which held-out samples cannot reveal.
-void check_seeds(const std::string& before, const std::string& now) {
-  const auto seed = [](const std::string& path) {
-    const auto attributes = inspect_image(path).attributes;
-    const auto found = attributes.find("covary:seed");
-    return found == attributes.end() ? std::string() : found->second;
-  };
-  const std::string own = seed(now);
-  if (!own.empty() && own == seed(before))
-    throw WrongSequence(
-        fmt::format("'{}' and '{}' have the same seed, {}; each frame needs its own seed, "
-                    "or --no-history",
-                    before, now, own));
-}
 
 MotionSource motion_source(const FrameOptions& o) {
   MotionSource source = o.motion;
@@ -174,7 +114,9 @@ void add_frame_options(CLI::App& command, FrameOptions& o, const std::string& wh
   command.add_flag("--resume", o.resume, "Of in_####.exr, leave out frames whose output is there already");
   command.add_flag("--watch", o.watch,
                    "Of in_####.exr, wait for frames and treat each when its files are complete, until all of --frames "
-                   "are done or Ctrl-C");
+                   "are done, --idle or Ctrl-C");
+  command.add_option("--idle", o.idle, "With --watch, end after so many seconds without a new frame")
+      ->check(positive_number());
   command.add_flag("--no-history", o.no_history, what + " each frame alone");
 }
 
@@ -200,8 +142,10 @@ bool are_frames(const FrameOptions& o, const FramePatterns& patterns) {
     if (!o.frames.empty()) usage("--frames: the input has no '#' for the frame's number");
     if (o.resume) usage("--resume: the input has no '#' for the frame's number");
     if (o.watch) usage("--watch: the input has no '#' for the frame's number");
+    if (o.idle) usage("--idle is an option of --watch");
     return false;
   }
+  if (o.idle && !o.watch) usage("--idle is an option of --watch");
   for (const std::string& path : patterns.images)
     if (!is_frame_pattern_of_input(path))
       usage(fmt::format("'{}' has no '#' for the frame number, but others do", path));
@@ -344,33 +288,68 @@ class Frames {
   std::vector<int> failed_, kept_;
 };
 
-/// Whether all files of a frame are there, complete, and not changed for a while.
-bool is_ready(const FramePatterns& patterns, int frame) {
-  constexpr std::chrono::seconds kSettled(2);
-  return std::all_of(patterns.images.begin(), patterns.images.end(), [&](const std::string& pattern) {
-    const std::string path = frame_name(pattern, frame);
-    std::error_code error;
-    const auto written = std::filesystem::last_write_time(path, error);
-    return !error && std::filesystem::file_time_type::clock::now() - written > kSettled && is_complete_exr(path);
-  });
-}
+/// Frames of files that a farm is writing.
+class WatchedFrames {
+ public:
+  WatchedFrames(const FrameOptions& o, const FramePatterns& patterns) : patterns_(patterns) {
+    if (!o.frames.empty()) wanted_ = frames_of(o.frames, patterns.images[0]);
+  }
 
-/// Waits for frames and runs those that are ready and not done, until all of --frames are.
+  bool are_all_done() const { return !wanted_.empty() && done_.size() == wanted_.size(); }
+  /// Seconds since a frame was ready.
+  double idle_seconds() const { return idle_.seconds(); }
+
+  /// The frames that have become ready: all of their files are there and settled.
+  std::vector<int> next() {
+    std::vector<int> ready;
+    for (const int frame : wanted_.empty() ? frames_on_disk(patterns_.images[0]) : wanted_) {
+      if (done_.contains(frame)) continue;
+      size_t n = 0;  // of all files, so that each begins to settle
+      for (const std::string& pattern : patterns_.images) n += files_.is_settled(frame_name(pattern, frame));
+      if (n == patterns_.images.size()) done_.insert(frame), ready.push_back(frame);
+    }
+    if (!ready.empty()) idle_ = Stopwatch();
+    return ready;
+  }
+  /// Not counting the time that a frame took.
+  void wait() { idle_ = Stopwatch(); }
+
+  /// Frames with files that are missing or incomplete.
+  std::vector<int> unfinished() const {
+    std::vector<int> left;
+    for (const int frame : wanted_.empty() ? frames_on_disk(patterns_.images[0]) : wanted_)
+      if (!done_.contains(frame)) left.push_back(frame);
+    return left;
+  }
+
+ private:
+  const FramePatterns& patterns_;
+  std::vector<int> wanted_;
+  std::set<int> done_;
+  SettledFiles files_;
+  Stopwatch idle_;
+};
+
+/// Waits for frames and runs those that are ready and not done, until all of --frames are, or nothing comes any more.
 void watch_frames(const FrameOptions& o, const FramePatterns& patterns, bool has_history, const Frames::Run& run) {
-  const std::vector<int> wanted = o.frames.empty() ? std::vector<int>() : frames_of(o.frames, patterns.images[0]);
-  std::set<int> seen;
+  WatchedFrames watched(o, patterns);
   std::optional<Frames> frames;
-  if (!o.quiet) fmt::print(stderr, "waiting for frames '{}'; Ctrl-C ends\n", patterns.images[0]);
-  while (wanted.empty() || seen.size() < wanted.size()) {
-    for (const int frame : wanted.empty() ? frames_on_disk(patterns.images[0]) : wanted) {
-      if (seen.contains(frame) || !is_ready(patterns, frame)) continue;
-      seen.insert(frame);
+  if (!o.quiet)
+    fmt::print(stderr, "waiting for frames '{}'; Ctrl-C{} ends\n", patterns.images[0],
+               o.idle ? fmt::format(", or {:g} s without a new frame,", *o.idle) : "");
+  while (!watched.are_all_done() && !(o.idle && watched.idle_seconds() > *o.idle)) {
+    for (const int frame : watched.next()) {
       if (!frames) frames.emplace(o, patterns, std::vector{frame, frame + 1}, has_history, run);
       frames->add(frame, fmt::format("frame {}", frame));
+      watched.wait();
     }
-    std::this_thread::sleep_for(std::chrono::seconds(1));
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
   }
-  frames->finish();
+  const std::vector<int> left = watched.unfinished();
+  if (!left.empty())
+    fmt::print(stderr, "warning: frames {} are incomplete: files of '{}' are missing or unfinished\n", text_of(left),
+               fmt::join(patterns.images, "', '"));
+  if (frames) frames->finish();
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,9 +20,10 @@ struct FrameOptions {
   std::string frames, motion_scale;
   MotionSource motion;
   bool no_history = false, resume = false, watch = false, quiet = false;
+  std::optional<double> idle;  ///< seconds without a new frame after which --watch ends
 };
 
-/// --frames, --resume, --watch, --motion, --depth, --motion-scale, --no-history. `what`: "Denoise".
+/// --frames, --resume, --watch, --idle, --motion, --depth, --motion-scale, --no-history. `what`: "Denoise".
 void add_frame_options(CLI::App& command, FrameOptions& options, const std::string& what);
 
 /// The frame numbers of --frames or, if that is empty, those of the pattern's existing files. Throws Error(kUsage), and

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// Files that other programs write, and when they are complete.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+
+namespace covary {
+
+/// Watches files by polling. A file is settled if it is an EXR file that is complete, and its size and time have not
+/// changed for kSettled by this machine's clock, whatever that of a file server says.
+class SettledFiles {
+ public:
+  static constexpr std::chrono::milliseconds kSettled{2000};
+
+  /// Looks at the file once more; false for files that do not exist.
+  bool is_settled(const std::string& path);
+
+ private:
+  struct Seen {
+    std::uintmax_t size = 0;
+    std::filesystem::file_time_type written;
+    std::chrono::steady_clock::time_point since;
+  };
+  std::map<std::string, Seen> seen_;
+};
+
+}  // namespace covary

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Work as it is in production: long sequences that are interrupted, with frames that are damaged or missing; frames
+that a farm writes slowly; headers that are damaged."""
+import os
+import random
+import signal
+import subprocess
+import threading
+import time
+
+from cli_test import COVARY, CliTest
+from destruction_test import mutilated
+from exr_reader import read_exr
+from exr_writer import exr, film, multipart
+
+SIZE = (16, 12)
+DENOISE = ("denoise", "a.####.exr", "b.####.exr", "--oidn", "off", "-o", "o.####.exr")
+
+
+def noisy(seed):
+    chance = random.Random(seed)
+    return exr({c: [0.5 * chance.expovariate(1) for _ in range(SIZE[0] * SIZE[1])] for c in "RGB"}, SIZE)
+
+
+class LongSequence(CliTest):
+    FRAMES, MISSING, BAD = 240, 77, (40, 160)
+
+    def interrupted(self, done):
+        """Runs until so many frames are done, and interrupts."""
+        process = subprocess.Popen([COVARY, *DENOISE, "--resume"], cwd=self.path, stderr=subprocess.DEVNULL)
+        while process.poll() is None and len(list(self.path.glob("o.*.exr"))) < done:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(process.wait(60), 130)
+
+    def test_interrupted_twice_with_bad_and_missing_frames(self):
+        frames = [n for n in range(1, self.FRAMES + 1) if n != self.MISSING]
+        for n in frames:
+            for render in "ab":
+                data = noisy(f"{render}{n}")
+                row = len(data) - 8 * (8 + 4 * 3 * SIZE[0])  # from here on, rows are not what the header says
+                self.write(f"{render}.{n:04d}.exr", data[:row] + b"\xff" * (len(data) - row) if n in self.BAD else data)
+        self.interrupted(60)
+        self.interrupted(150)
+        left = sorted(p.name for p in self.path.iterdir() if p.name[0] not in "abo")
+        self.assertEqual(left, [], "nothing is left of the frames that were begun")
+        before = {p.name: p.stat().st_mtime_ns for p in self.path.glob("o.*.exr")}
+        result = self.run_covary(*DENOISE, "--resume")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("note: 'a.####.exr' has no frames 77\n", result.stderr)
+        for n in self.BAD:
+            self.assertRegex(result.stderr, rf"warning: frame {n} \(\d+ of 239\) failed: a\.{n:04d}\.exr: ")
+        self.assertRegex(result.stderr, r"\n\d+ frames in [\d.]+ s; \d+ were there already: ")
+        self.assertIn("2 of 239 frames failed: 40, 160", result.stderr)
+        good = [n for n in frames if n not in self.BAD]
+        self.assertEqual(sorted(p.name for p in self.path.glob("o.*.exr")), [f"o.{n:04d}.exr" for n in good])
+        for name, time_of in before.items():
+            self.assertEqual((self.path / name).stat().st_mtime_ns, time_of, "done once")
+        for n in (1, 61, 151, 240):
+            self.good("denoise", f"a.{n:04d}.exr", f"b.{n:04d}.exr", "--oidn", "off", "-o", "alone.exr", "--overwrite")
+            alone, together = (read_exr((self.path / name).read_bytes()) for name in ("alone.exr", f"o.{n:04d}.exr"))
+            self.assertEqual(together["R"], alone["R"])
+
+
+class SlowFarm(CliTest):
+    def test_frames_are_taken_when_they_are_whole(self):
+        """One program writes its frames bit by bit, the other under another name."""
+        frames = {(render, n): noisy(f"{render}{n}") for render in "ab" for n in (1, 2, 3)}
+
+        def write_all():
+            for n in (1, 2, 3):
+                with open(self.path / f"a.{n:04d}.exr", "wb") as file:
+                    data = frames["a", n]
+                    for first in range(0, len(data), len(data) // 4):
+                        file.write(data[first:first + len(data) // 4])
+                        file.flush()
+                        time.sleep(0.3)
+                self.write(f"b.{n:04d}.exr.part", frames["b", n])
+                os.rename(self.path / f"b.{n:04d}.exr.part", self.path / f"b.{n:04d}.exr")
+            self.write("a.0004.exr", frames["a", 1][:700])  # is never finished
+
+        farm = threading.Thread(target=write_all)
+        farm.start()
+        result = self.run_covary(*DENOISE, "--watch", "--idle", "6")
+        farm.join()
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("waiting for frames 'a.####.exr'; Ctrl-C, or 6 s without a new frame, ends\n", result.stderr)
+        self.assertIn("warning: frames 4 are incomplete", result.stderr)
+        self.assertRegex(result.stderr, r"\n3 frames in [\d.]+ s\n")
+        for n in (1, 2, 3):
+            self.write("x.exr", frames["a", n])
+            self.write("y.exr", frames["b", n])
+            self.good("denoise", "x.exr", "y.exr", "--oidn", "off", "-o", "alone.exr", "--overwrite")
+            alone, together = (read_exr((self.path / name).read_bytes()) for name in ("alone.exr", f"o.{n:04d}.exr"))
+            self.assertEqual(together["R"], alone["R"])
+        self.bad(2, "--idle is an option of --watch", *DENOISE, "--idle", "3")
+
+
+class Headers(CliTest):
+    FILES = 1000
+
+    def test_damaged_headers(self):
+        """A command reads such a file or refuses it, naming it; none crashes."""
+        planes = {f"{layer}{c}": [0.5] * 12 for layer in ("", "Albedo.", "ViewLayer.Combined.") for c in "RGB"}
+        parts = [{"name": name, "channels": {c: [1.0] * 12 for c in "RGB"}} for name in ("left", "right")]
+        files = ((exr(planes, (4, 3), attributes={"a": "text" * 9}), 3 * (8 + 16 * 9)), (film(1), 3 * (8 + 16 * 10)),
+                 (multipart(parts, (4, 3)), 6 * (12 + 16 * 3)))  # with the bytes of their pixels
+        commands = (("info", "bad.exr"), ("convert", "bad.exr", "o.png", "--overwrite"),
+                    ("denoise", "bad.exr", "bad2.exr", "--oidn", "off", "--force", "-o", "o.exr", "--overwrite"))
+        chance, codes = random.Random(1000), []
+        for i in range(self.FILES):
+            whole, pixels = files[i // len(commands) % len(files)]
+            bad = mutilated(whole[:-pixels], chance) + whole[-pixels:]
+            self.write("bad.exr", bad)
+            self.write("bad2.exr", bad)
+            result = self.run_covary(*commands[i % len(commands)], errors="replace")
+            self.assertIn(result.returncode, (0, 1, 2), result.stderr)
+            if result.returncode:
+                self.assertIn("bad", result.stderr)
+            codes.append(result.returncode)
+        self.assertGreater(sum(code != 0 for code in codes), self.FILES / 3)
+
+
+if __name__ == "__main__":
+    import unittest
+    unittest.main()
