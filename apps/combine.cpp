@@ -201,9 +201,7 @@ struct Inputs {
     if (const bool splits = request.estimator.splits_layers; splits || !o.layers.empty())
       request.layers =
           layers.emplace(o.independent, Picture{"", o.view, independent.source().picture}, o.layers, splits).sources();
-    constexpr double kMebibyte = 1 << 20, kUsual = 4096 * kMebibyte;
-    if (o.memory_mib) request.most_memory = *o.memory_mib * kMebibyte;
-    request.memory = request.most_memory.value_or(std::min(kUsual, memory_limit()));
+    limit_memory(request, o.memory_mib);
     request.force = o.force;
   }
   Inputs(const Inputs&) = delete;

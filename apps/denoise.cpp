@@ -16,6 +16,7 @@
 
 #include "combine/beauty_layers.h"
 #include "combine/combine.h"
+#include "combine/combine_settings.h"
 #include "combine/registry.h"
 #include "combine/result_file.h"
 #include "commands.h"
@@ -54,6 +55,7 @@ struct Options {
   std::vector<std::string> layers;
   bool no_guides = false, clean_guides = false, check = false, quiet = false, force = false, overwrite = false;
   FrameOptions of_frames;
+  std::optional<double> memory_mib;
   std::shared_ptr<const History> history;  ///< of the frame being denoised
 
   DenoiseOptions denoiser() const { return {oidn}; }
@@ -199,6 +201,7 @@ Denoised denoise_by_mixture(const Options& o, const Task& task, const GroupedFil
   const BeautyLayers layers(o.inputs, task.picture, o.layers, true);
   request.layers = layers.sources();
   request.force = o.force;
+  limit_memory(request, o.memory_mib);
   request.checked = [&](const InputFindings& found) {
     progress.clear();
     print_findings(found.findings, o.force, o.quiet);
@@ -357,6 +360,7 @@ void add_denoise(CLI::App& app) {
       "--clean-guides", o->clean_guides,
       "With --mode oidn, denoise the guides first: less error if they are noisy, in three times the time");
   add_value(*command, "--json", o->json, kFileValue, "File for statistics of a mixture; '-': standard output");
+  command->add_option("--memory", o->memory_mib, kMemoryHelp)->check(positive_number());
   add_frame_options(*command, o->of_frames, "Denoise");
   add_overwrite_option(*command, o->overwrite);
   command->add_flag("--force", o->force, "Denoise even if the renders do not match");

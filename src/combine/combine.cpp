@@ -14,7 +14,9 @@
 #include "core/memory_limit.h"
 #include "core/stopwatch.h"
 #include "estimators/mean.h"
+#include "estimators/result_rows.h"
 #include "filters/planes.h"
+#include "filters/regression.h"
 #include "filters/residual_correction.h"
 #include "risk/error_interval.h"
 #include "risk/held_out_error.h"
@@ -25,9 +27,15 @@ namespace {
 
 constexpr int kLightRows = 64;  // rows of the light film in memory at a time
 constexpr int kFewestRows = 16;
+/// Bands that share more than pixels have at least so many times the rows around them, if memory allows: those are
+/// computed twice.
+constexpr int kUsefulRows = 6;
 constexpr double kImagesOfLayer = 12;
 
 int groups_of(const std::optional<GroupedSource>& source) { return source ? source->groups : 0; }
+
+/// Layers and history are made of whole images.
+bool needs_whole(const CombineRequest& request) { return request.estimator.reach < 0 || !request.layers.empty(); }
 
 GroupedImage rows_of(const std::optional<GroupedSource>& source, int first, int n) {
   return source ? source->rows(first, n) : GroupedImage{};
@@ -38,33 +46,21 @@ void throw_errors(const InputFindings& inputs) {
     throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors);
 }
 
-/// Copies n rows of `part`, starting at its row `skipped`, to rows y … y + n - 1 of `whole`.
-void append(const EstimatorResult& part, int skipped, int y, int n, int height, EstimatorResult& whole) {
-  const auto copy = [&](const Image& from, Image& to) {
-    if (from.data.empty()) return;
-    if (to.data.empty()) to = Image(from.width, height, 3);
-    std::copy_n(from.pixel(0, skipped), static_cast<size_t>(from.width) * 3 * n, to.pixel(0, y));
-  };
-  copy(part.estimate, whole.estimate);
-  copy(part.std_error, whole.std_error);
-  copy(part.bias, whole.bias);
-  whole.risk_kind = part.risk_kind;
-  if (!part.held_out.empty())
-    whole.held_out.insert(whole.held_out.end(), part.held_out.begin() + skipped, part.held_out.begin() + skipped + n);
-  if (!part.risk_rows.empty())
-    whole.risk_rows.insert(whole.risk_rows.end(), part.risk_rows.begin() + skipped,
-                           part.risk_rows.begin() + skipped + n);
+/// "2 renders", "12 + 12 groups"
+std::string inputs_text(const CombineRequest& request) {
+  const int crn = groups_of(request.crn), n = request.independent.groups;
+  if (request.crn) return fmt::format("{} + {} groups", crn, n);
+  return fmt::format("{} {}", n, request.independent.origin.renders.empty() ? "groups" : "renders");
 }
 
 void check_memory(const CombineRequest& request, double planned) {
   if (planned <= std::max(kLeastMemoryLimit, request.most_memory.value_or(memory_limit()))) return;
-  throw Error(
-      ErrorCode::kUsage,
-      fmt::format("{} x {} pixels of {} + {} groups need {} of memory for {}{}; {}", request.independent.width,
-                  request.independent.height, groups_of(request.crn), request.independent.groups, bytes_text(planned),
-                  request.estimator.text, request.estimator.reach < 0 ? ", which works on whole images" : "",
-                  request.most_memory ? "permitted are " + bytes_text(*request.most_memory) + " (`memory`)"
-                                      : memory_limit_text()));
+  throw Error(ErrorCode::kUsage,
+              fmt::format("{} x {} pixels of {} need {} of memory for {}{}; {}", request.independent.width,
+                          request.independent.height, inputs_text(request), bytes_text(planned), request.estimator.text,
+                          needs_whole(request) ? ", which works on whole images" : "",
+                          request.most_memory ? "permitted are " + bytes_text(*request.most_memory) + " (`memory`)"
+                                              : memory_limit_text()));
 }
 
 /// The light film's error is its variance alone and is added to every image. `before`: the error predicted without it.
@@ -96,8 +92,14 @@ EstimatorResult estimate_layers(const CombineRequest& request, std::map<std::str
 EstimatorResult estimate(const CombineRequest& request) {
   const Estimator& estimator = request.estimator;
   const int height = request.independent.height, in_memory = rows_in_memory(request);
-  if (estimator.reach < 0 || in_memory >= height)
+  if (needs_whole(request) || in_memory >= height)
     return estimator.apply(rows_of(request.crn, 0, height), request.independent.all(), request.settings);
+  if (estimator.apply_in_rows) {
+    const auto rows = [&](int first, int n) {
+      return PairInRows::Rows{rows_of(request.crn, first, n), request.independent.rows(first, n)};
+    };
+    return estimator.apply_in_rows({request.independent.width, height, in_memory, rows}, request.settings);
+  }
   const int step = std::max(kFewestRows, in_memory - 2 * estimator.reach) / kResidualCell * kResidualCell;
   EstimatorResult whole;
   for (int y = 0; y < height; y += step) {
@@ -108,7 +110,7 @@ EstimatorResult estimate(const CombineRequest& request) {
     finite_pixels(covary::rows_of(band.crn, y - band.first, n), covary::rows_of(band.independent, y - band.first, n),
                   n_nonfinite);
     whole.nonfinite_pixels += n_nonfinite;
-    append(part, y - band.first, y, n, height, whole);
+    append_rows(part, y - band.first, y, n, height, whole);
   }
   return whole;
 }
@@ -122,24 +124,52 @@ double memory_of_rows(const CombineRequest& request, int rows) {
   const bool holds_out = request.settings.std_error && request.settings.held_out;
   const int groups = holds_out ? std::min(request.crn ? crn_groups : all_groups, request.independent.groups) : 0;
   const double values = kImage * all_groups + 2 * kCount;
+  const Guides& guides = request.settings.guides;
+  double n_guides = 0;
+  for (const Image* guide :
+       {guides.albedo, guides.normal, guides.denoising_albedo, guides.denoising_normal, guides.position})
+    n_guides += guide != nullptr;
+  const bool in_bands = rows < request.independent.height;
   // For bands: the estimate of the whole image; its standard error and bias are stored beside them.
-  const double results = rows < request.independent.height ? 3 * kImage * width * request.independent.height : 0;
+  const double of_whole = n_guides * kImage + (in_bands ? 3 * kImage + request.estimator.memory.of_whole : 0);
+  const double results = of_whole * width * request.independent.height;
   const double layers = request.layers.empty() ? 0 : static_cast<double>(request.layers.size() + 1);
-  return n_pixels * (values + layers * layer_bytes(request.independent.groups)) +
+  return n_pixels * (values + layers * layer_bytes(request.independent.groups) + (in_bands ? n_guides * kImage : 0)) +
          request.estimator.memory.bytes(n_pixels, groups) + results;
 }
 
-int rows_in_memory(const CombineRequest& request) {
+namespace {
+
+/// Rows of bands that need no more memory.
+int rows_within(const CombineRequest& request, double memory) {
   const int height = request.independent.height;
-  if (memory_of_rows(request, height) <= request.memory) return height;
+  if (memory_of_rows(request, height) <= memory) return height;
   const double results = memory_of_rows(request, 0), row = memory_of_rows(request, 1) - results;
-  return static_cast<int>(std::clamp((request.memory - results) / row, 0.0, static_cast<double>(height)));
+  return static_cast<int>(std::clamp((memory - results) / row, 0.0, height - 1.0));
+}
+
+double most_memory_of(const CombineRequest& request) { return request.most_memory.value_or(memory_limit()); }
+
+}  // namespace
+
+int rows_in_memory(const CombineRequest& request) {
+  const int rows = rows_within(request, request.memory);
+  if (!request.estimator.apply_in_rows || needs_whole(request)) return rows;
+  const int useful = kUsefulRows * request.estimator.reach;
+  if (rows >= useful) return rows;
+  return std::max(rows, std::min(useful, rows_within(request, most_memory_of(request))));
 }
 
 double planned_memory(const CombineRequest& request) {
   const int height = request.independent.height, reach = request.estimator.reach;
-  const int fewest = reach < 0 ? height : std::min(height, kFewestRows + 2 * reach);
+  const int fewest = needs_whole(request) ? height : std::min(height, kFewestRows + kRegressionCell + 2 * reach);
   return memory_of_rows(request, std::max(fewest, rows_in_memory(request)));
+}
+
+void limit_memory(CombineRequest& request, std::optional<double> mebibytes) {
+  constexpr double kMebibyte = 1 << 20, kUsual = 6144 * kMebibyte;
+  if (mebibytes) request.most_memory = *mebibytes * kMebibyte;
+  request.memory = request.most_memory.value_or(std::min(kUsual, memory_limit()));
 }
 
 Band band_around(const CombineRequest& request, int first, int last) {

@@ -69,6 +69,9 @@ double planned_memory(const CombineRequest& request);
 double memory_of_rows(const CombineRequest& request, int rows);
 /// Rows that combine() has in memory at a time.
 int rows_in_memory(const CombineRequest& request);
+/// Sets the memory limits as `--memory` does; by default, bands are as large as 6144 MiB allow, and other work as
+/// memory_limit() does.
+void limit_memory(CombineRequest& request, std::optional<double> mebibytes);
 
 /// Rows of both images; empty for a missing one.
 struct Band {

@@ -60,9 +60,7 @@ void declare(Settings& s, CombineSettings& v) {
   s.flag("error", v.error, "Add the standard error as channels StdError.R, .G, .B");
   s.text_as("explain", v.explain, "X,Y", read_pixel, "Print the control variates of this pixel and their coefficients");
   s.flag("force", v.force, "Combine even if the check of the inputs finds errors");
-  s.real("memory", v.memory_mib, {.low = 0, .above_low = true},
-         "Memory limit in MiB: larger images are processed in bands, with the same bits, or refused by estimators that "
-         "need whole images; default: 4096 for bands, most of the machine's memory for whole images");
+  s.real("memory", v.memory_mib, {.low = 0, .above_low = true}, kMemoryHelp);
 }
 
 }  // namespace covary

@@ -12,6 +12,11 @@
 
 namespace covary {
 
+/// Help of `memory`.
+inline constexpr const char* kMemoryHelp =
+    "Memory limit in MiB: larger images are processed in bands of rows, with the same bits, or refused where whole "
+    "images are needed (layers, frames with history); default: 6144 for bands, most of the machine's memory otherwise";
+
 /// Position in the full frame.
 struct PixelPosition {
   int x, y;

@@ -264,7 +264,7 @@ std::string row_of(const Estimator& e) {
                        : pair                                  ? "CRN and independent"
                        : e.passes == EstimatorPasses::kSamples ? "independent, all samples of a pixel"
                                                                : "one of either kind";
-  const std::string combine = is_default || (pair && e.reach < 0) ? "whole images" : pair ? "in bands" : "no";
+  const std::string combine = pair && e.reach < 0 ? "whole images" : pair || is_default ? "in bands" : "no";
   return fmt::format("| `{}` | {} | {} | {} | {} | {} |", e.name, passes, e.fewest_groups, yes_or_no(e.predicts_error),
                      yes_or_no(e.explain != nullptr), combine);
 }

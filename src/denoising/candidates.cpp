@@ -5,6 +5,7 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <utility>
 
 #include "denoising/mirrored_halves.h"
 #include "filters/nl_means.h"
@@ -38,10 +39,11 @@ Image combined(const Image& a, const Image& b, const Operation& operation) {
 
 struct FilterGuides {
   Planes all, normal;
-  Image albedo;                 // at least kLeastAlbedo; empty where there is none
-  std::vector<Image> features;  // of the regression; none: without it
-  Image position;               // likewise; empty where there is none
-  bool nl_means = true;         // of the image itself, too
+  Image albedo;                        // at least kLeastAlbedo; empty where there is none
+  std::vector<const Image*> features;  // of the regression; none: without it
+  const Image* position = nullptr;     // likewise; or null
+  bool nl_means = true;                // of the image itself, too
+  int first_row = 0;                   // of a larger image
 };
 
 FilterGuides filter_guides(const Guides& guides, FilterKinds kinds) {
@@ -53,11 +55,11 @@ FilterGuides filter_guides(const Guides& guides, FilterKinds kinds) {
   if (kinds != FilterKinds::kNlMeans) {
     result.nl_means = kinds == FilterKinds::kAll;
     const Guides behind_glass = network_guides(guides);
-    result.features.push_back(*behind_glass.albedo);
-    if (behind_glass.normal) result.features.push_back(*behind_glass.normal);
+    result.features.push_back(behind_glass.albedo);
+    if (behind_glass.normal) result.features.push_back(behind_glass.normal);
     if (behind_glass.normal && behind_glass.normal->data != guides.normal->data)
-      result.features.push_back(*guides.normal);
-    if (guides.position) result.position = *guides.position;
+      result.features.push_back(guides.normal);
+    result.position = guides.position;
   }
   result.all = planes(*guides.albedo, guides.normal ? 6 : 3);
   copy_guide(*guides.albedo, kAlbedoUnit, 0, result.all);
@@ -71,17 +73,15 @@ FilterGuides filter_guides(const Guides& guides, FilterKinds kinds) {
 }
 
 const Planes* or_null(const Planes& planes) { return planes.count() > 0 ? &planes : nullptr; }
-const Image* or_null(const Image& image) { return image.data.empty() ? nullptr : &image; }
 
 /// The sources filtered by regression; `others`: their images by another filter. Coarse for halves, which serve only to
 /// find weights.
 std::vector<Image> regressed(const FilterGuides& guides, const CandidateInput& in, std::vector<const Image*> sources,
-                             std::span<const Image> others, bool is_half) {
-  RegressionInput input{in.estimate, in.std_error, std::move(sources), {}, or_null(guides.position), is_half};
+                             std::span<const Image> others) {
+  RegressionInput input{in.estimate,     in.std_error, std::move(sources), {},
+                        guides.position, in.part > 0,  guides.first_row};
   for (const Image& other : others) input.others.push_back(&other);
-  std::vector<const Image*> features;
-  for (const Image& feature : guides.features) features.push_back(&feature);
-  return regressed(input, features, *in.valid);
+  return regressed(input, guides.features, *in.valid);
 }
 
 /// The candidates of each input.
@@ -96,7 +96,7 @@ std::vector<std::vector<Image>> filtered(const FilterGuides& guides, CandidateBa
       if (base == CandidateBase::kPair) sharp.push_back(in.independent);
       steerings.push_back({in.estimate, in.std_error, {{kSharp, sharp}, {kSmooth, {in.estimate}}}});
     }
-    images = nl_means(steerings, or_null(guides.all), *inputs[0].valid);
+    images = nl_means(steerings, or_null(guides.all), *inputs[0].valid, guides.first_row);
     const size_t n = images.size() / inputs.size();
     for (size_t i = 0; i < images.size(); ++i) all[i / n].push_back(std::move(images[i]));
     if (guides.albedo.data.empty()) return all;
@@ -108,11 +108,12 @@ std::vector<std::vector<Image>> filtered(const FilterGuides& guides, CandidateBa
     const Image& error = demodulated.emplace_back(combined(*in.std_error, guides.albedo, std::divides<>()));
     steerings.push_back({&image, &error, {{kSharp, {&image}}}});
   }
-  images = nl_means(steerings, or_null(guides.normal), *inputs[0].valid);
+  images = nl_means(steerings, or_null(guides.normal), *inputs[0].valid, guides.first_row);
+  demodulated.clear(), steerings.clear();
   for (size_t i = 0; i < all.size(); ++i) {
     all[i].push_back(combined(images[i], guides.albedo, std::multiplies<>()));
     if (!guides.features.empty())
-      all[i].insert(all[i].begin(), regressed(guides, inputs[i], {inputs[i].estimate}, {&all[i].back(), 1}, i > 0)[0]);
+      all[i].insert(all[i].begin(), regressed(guides, inputs[i], {inputs[i].estimate}, {&all[i].back(), 1})[0]);
   }
   return all;
 }
@@ -128,7 +129,7 @@ std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, cons
   std::vector<std::vector<Image>> all;
   if (guides.nl_means) {
     steerings = {{in.estimate, in.std_error, {{kSharp, sources}, {kSmooth, sources}}}};
-    images = nl_means(steerings, or_null(guides.all), *in.valid);
+    images = nl_means(steerings, or_null(guides.all), *in.valid, guides.first_row);
     all.emplace_back(images.begin(), images.begin() + n);
     all.emplace_back(images.begin() + n, images.end());
     if (guides.albedo.data.empty()) return all;
@@ -140,10 +141,10 @@ std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, cons
   for (const Image& layer : layers)
     without_albedo.push_back(&demodulated.emplace_back(combined(layer, guides.albedo, std::divides<>())));
   steerings = {{&demodulated[0], &demodulated[1], {{kSharp, without_albedo}}}};
-  images = nl_means(steerings, or_null(guides.normal), *in.valid);
+  images = nl_means(steerings, or_null(guides.normal), *in.valid, guides.first_row);
   for (Image& image : images) image = combined(image, guides.albedo, std::multiplies<>());
   all.push_back(std::move(images));
-  if (!guides.features.empty()) all.insert(all.begin(), regressed(guides, in, sources, all.back(), false));
+  if (!guides.features.empty()) all.insert(all.begin(), regressed(guides, in, sources, all.back()));
   return all;
 }
 
@@ -152,46 +153,43 @@ class GuidedNetwork {
  public:
   GuidedNetwork(const Guides& guides, const DenoiseOptions& options) : denoiser_(options) {
     if (!guides.albedo) return;
-    if (guides.clean) {
-      albedo_ = *guides.albedo;
-      if (guides.normal) normal_ = *guides.normal;
-      return;
-    }
-    albedo_ = denoiser_.denoise_guide("albedo", *guides.albedo);
-    if (guides.normal) normal_ = denoiser_.denoise_guide("normal", *guides.normal);
+    const auto clean = [&](const char* name, const Image& guide) {
+      return std::make_shared<const Image>(guides.clean ? guide : denoiser_.denoise_guide(name, guide));
+    };
+    albedo_ = clean("albedo", *guides.albedo);
+    if (guides.normal) normal_ = clean("normal", *guides.normal);
   }
 
   int runs() const { return denoiser_.runs(); }
   /// `image` is already mirrored.
-  Image denoise(const Image& image, Mirror mirror = Mirror::kNone) {
-    if (mirror == Mirror::kNone) return denoiser_.denoise(image, or_null(albedo_), or_null(normal_), true);
-    const Image albedo = mirrored(albedo_, mirror), normal = mirrored(normal_, mirror);
-    return denoiser_.denoise(image, or_null(albedo), or_null(normal), true);
+  Image denoise(Image image, Mirror mirror = Mirror::kNone) {
+    const auto turned = [&](const std::shared_ptr<const Image>& guide) {
+      return guide && mirror != Mirror::kNone ? std::make_shared<const Image>(mirrored(*guide, mirror)) : guide;
+    };
+    return denoiser_.denoise(std::move(image), turned(albedo_), turned(normal_), true);
   }
 
  private:
-  static const Image* or_null(const Image& image) { return image.data.empty() ? nullptr : &image; }
-
   Denoiser denoiser_;
-  Image albedo_, normal_;
+  std::shared_ptr<const Image> albedo_, normal_;
 };
 
-/// The independent images denoised: the network was trained on noise that is independent between pixels.
-/// `with_residual`: the estimates instead, also with residual correction in two widths.
-std::vector<std::vector<Image>> denoised(GuidedNetwork& network, std::span<const CandidateInput> inputs,
-                                         bool with_residual) {
-  std::vector<const Image*> noisy;
-  for (const CandidateInput& in : inputs) noisy.push_back(with_residual ? in.estimate : in.independent);
-  const std::vector<Image> clean =
-      denoise_with_halves(noisy, [&](const Image& image, Mirror mirror) { return network.denoise(image, mirror); });
-  std::vector<std::vector<Image>> all;
-  for (size_t i = 0; i < inputs.size(); ++i) {
-    std::vector<Image>& images = all.emplace_back(with_residual ? 3 : 1, clean[i]);
-    if (!with_residual) continue;
-    add_residual(*inputs[i].moments, kWideResidual, *inputs[i].valid, images[1]);
-    add_residual(*inputs[i].moments, kNarrowResidual, *inputs[i].valid, images[2]);
-  }
-  return all;
+void denoise_all(GuidedNetwork& network, std::span<Image> images) {
+  denoise_with_halves(images, [&](Image image, Mirror mirror) { return network.denoise(std::move(image), mirror); });
+}
+
+/// The network's images as candidates; `with_residual`: also with residual correction in two widths.
+std::vector<Image> with_residuals(const CandidateInput& in, const Image& clean, bool with_residual) {
+  std::vector<Image> images(with_residual ? 3 : 1, clean);
+  if (!with_residual) return images;
+  add_residual(*in.moments, kWideResidual, *in.valid, images[1]);
+  add_residual(*in.moments, kNarrowResidual, *in.valid, images[2]);
+  return images;
+}
+
+/// What the network denoises: it was trained on noise that is independent between pixels.
+const Image& noisy_of(const CandidateInput& in, CandidateBase base) {
+  return base == CandidateBase::kMean ? *in.estimate : *in.independent;
 }
 
 }  // namespace
@@ -204,8 +202,9 @@ CandidateMaker::Make one_by_one(std::function<std::vector<Image>(const Candidate
   };
 }
 
-CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base, FilterKinds kinds) {
+CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base, FilterKinds kinds, int first_row) {
   const auto kept = std::make_shared<FilterGuides>(filter_guides(guides, kinds));
+  kept->first_row = first_row;
   CandidateMaker maker;
   if (!kept->features.empty()) maker.names = {"regression"};
   if (kept->nl_means) {
@@ -227,19 +226,40 @@ Guides network_guides(const Guides& guides) {
   return {guides.denoising_albedo, guides.denoising_normal, nullptr, nullptr, nullptr, guides.clean};
 }
 
-CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& options, CandidateBase base) {
-  const auto network = std::make_shared<GuidedNetwork>(network_guides(guides), options);
+NetworkImages network_images(const Guides& guides, const DenoiseOptions& options, std::array<Image, 3> images) {
+  GuidedNetwork network(network_guides(guides), options);
+  const bool has_halves = !images[1].data.empty();
+  denoise_all(network, std::span(images).first(has_halves ? 3 : 1));
+  return {std::move(images), network.runs()};
+}
+
+CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& options, CandidateBase base,
+                                 std::shared_ptr<const NetworkImages> made) {
+  const bool is_mean = base == CandidateBase::kMean;
   CandidateMaker maker;
   maker.error_over_variance = 1.1;
   maker.network = true;
-  maker.runs = [network] { return network->runs(); };
-  if (base == CandidateBase::kPair) {
-    maker.names = {"oidn-independent"};
-    maker.make = [network](std::span<const CandidateInput> in) { return denoised(*network, in, false); };
+  maker.names = is_mean ? std::vector<std::string>{"oidn", "oidn-wide", "oidn-narrow"}
+                        : std::vector<std::string>{"oidn-independent"};
+  if (made) {
+    maker.runs = [made] { return made->runs; };
+    maker.make = one_by_one([made, is_mean](const CandidateInput& in) {
+      return with_residuals(in, made->images[static_cast<size_t>(in.part)], is_mean);
+    });
     return maker;
   }
-  maker.names = {"oidn", "oidn-wide", "oidn-narrow"};
-  maker.make = [network](std::span<const CandidateInput> in) { return denoised(*network, in, true); };
+  const auto network = std::make_shared<GuidedNetwork>(network_guides(guides), options);
+  maker.runs = [network] { return network->runs(); };
+  maker.make = [network, base](std::span<const CandidateInput> inputs) {
+    std::vector<Image> clean;
+    for (const CandidateInput& in : inputs) clean.push_back(noisy_of(in, base));
+    denoise_all(*network, clean);
+    std::vector<std::vector<Image>> all;
+    for (size_t i = 0; i < inputs.size(); ++i)
+      all.push_back(with_residuals(inputs[i], clean[i], base == CandidateBase::kMean));
+    return all;
+  };
+  if (!is_mean) return maker;
   maker.make_layers = [network, n = maker.names.size()](const CandidateInput&, std::span<const Image> layers) {
     std::vector<Image> images;
     for (const Image& layer : layers) images.push_back(network->denoise(layer));

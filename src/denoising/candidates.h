@@ -13,7 +13,9 @@
 // network's image of all samples is then averaged with those of the halves (mirrored_halves.h).
 #pragma once
 
+#include <array>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -31,12 +33,13 @@ struct CandidateInput {
   const Image* independent = nullptr;  ///< mean of the independent image
   const Moments* moments = nullptr;    ///< of the independent image
   const std::vector<unsigned char>* valid = nullptr;
+  int part = 0;  ///< all samples; 1, 2: the halves
 };
 
 /// Makes the same kinds of candidates from any set of samples.
 struct CandidateMaker {
-  /// The candidates of each set of samples: all samples alone, or all samples and both halves. All sets have the same
-  /// valid pixels.
+  /// The candidates of each set of samples: all samples, both halves, or all of these. All sets have the same valid
+  /// pixels.
   using Make = std::function<std::vector<std::vector<Image>>(std::span<const CandidateInput>)>;
 
   std::vector<std::string> names;  ///< of the candidates, in order
@@ -63,13 +66,30 @@ enum class CandidateBase { kPair, kMean };
 /// NL-means of the image and of the image over its albedo; for a mean with albedo, regression.h in place of the former,
 /// or all three. The regression gains next to nothing if a network's candidates are mixed in too.
 enum class FilterKinds { kNlMeans, kRegression, kAll };
-/// Candidates without a network. Copies the guides.
+/// Candidates without a network. The guides must outlive the result. `first_row`: of a larger image if these are rows
+/// of it, a multiple of kRegressionCell; kCandidateReach rows from those that are missing, the bits are those of the
+/// whole.
 CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base = CandidateBase::kPair,
-                                   FilterKinds kinds = FilterKinds::kNlMeans);
+                                   FilterKinds kinds = FilterKinds::kNlMeans, int first_row = 0);
 /// The guides for a neural network: those seen in mirrors and through glass, if available.
 Guides network_guides(const Guides& guides);
-/// Images denoised by a neural network. Throws like denoise().
+
+/// The images of a neural network: of all samples, averaged with those of the halves, and of both halves.
+struct NetworkImages {
+  std::array<Image, 3> images;
+  int runs = 0;  ///< of the network
+};
+/// `images`: what is denoised, of all samples and of both halves, or all samples alone with empty images of the halves.
+/// Throws like denoise().
+NetworkImages network_images(const Guides& guides, const DenoiseOptions& options, std::array<Image, 3> images);
+
+/// Images denoised by a neural network. `made`: its images, if they are made already; otherwise they are made, which
+/// takes all samples alone or with both halves, and throws like denoise().
 CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& options,
-                                 CandidateBase base = CandidateBase::kPair);
+                                 CandidateBase base = CandidateBase::kPair,
+                                 std::shared_ptr<const NetworkImages> made = nullptr);
+
+/// Radius of influence of the input, and of the network's images, on a pixel of any candidate, in rows.
+inline constexpr int kCandidateReach = 36;
 
 }  // namespace covary

@@ -10,7 +10,6 @@
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
-#include <deque>
 #include <filesystem>
 #include <memory>
 #include <string_view>
@@ -174,11 +173,17 @@ void check_size(const char* name, const Image& rgb, const Image* guide) {
             name, guide->width, guide->height, guide->channels, rgb.width, rgb.height));
 }
 
-Image finite(const Image& image) {
-  Image copy = image;
-  for (float& value : copy.data)
-    if (!std::isfinite(value)) value = 0;
+/// The image with 0 in place of values that are not finite.
+std::shared_ptr<const Image> finite(const std::shared_ptr<const Image>& image) {
+  const auto is_bad = [](float v) { return !std::isfinite(v); };
+  if (!image || std::none_of(image->data.begin(), image->data.end(), is_bad)) return image;
+  const auto copy = std::make_shared<Image>(*image);
+  std::replace_if(copy->data.begin(), copy->data.end(), is_bad, 0.0f);
   return copy;
+}
+
+std::shared_ptr<const Image> copy_of(const Image* image) {
+  return image ? std::make_shared<const Image>(*image) : nullptr;
 }
 
 void check_images(const Image& rgb, const Image* albedo, const Image* normal) {
@@ -226,7 +231,7 @@ namespace {
 /// the library cannot be stopped within a layer of the network (half a second or more on large images).
 struct Run {
   std::shared_ptr<const Denoiser::Library> library;
-  std::deque<std::pair<const char*, Image>> inputs;  ///< by the filter's names for them; at least one
+  std::vector<std::pair<const char*, std::shared_ptr<const Image>>> inputs;  ///< by the filter's names; at least one
   bool hdr = false, clean_guides = false, small_network = false;
   Image result;
   std::atomic<bool> cancelled{false};
@@ -238,11 +243,12 @@ struct Run {
     const std::unique_ptr<void, void (*)(void*)> filter(api.new_filter(library->device.get(), "RT"),
                                                         api.release_filter);
     library->check();
-    const auto set = [&](const char* name, Image& image) {
-      api.set_image(filter.get(), name, image.data.data(), Api::kFormatFloat3, image.width, image.height, 0, 0, 0);
+    const auto set = [&](const char* name, const Image& image) {
+      void* const pixels = const_cast<float*>(image.data.data());  // the library does not write to its inputs
+      api.set_image(filter.get(), name, pixels, Api::kFormatFloat3, image.width, image.height, 0, 0, 0);
     };
-    for (auto& [name, image] : inputs) set(name, image);
-    result = Image(inputs.front().second.width, inputs.front().second.height, 3);
+    for (const auto& [name, image] : inputs) set(name, *image);
+    result = Image(inputs.front().second->width, inputs.front().second->height, 3);
     set("output", result);
     if (hdr) api.set_bool(filter.get(), "hdr", true);
     if (clean_guides) api.set_bool(filter.get(), "cleanAux", true);
@@ -276,13 +282,18 @@ void check_guide(const std::string& name, const Image& guide) {
 Denoiser::Denoiser(const DenoiseOptions& options) : library_(std::make_shared<Library>(options)) {}
 Denoiser::~Denoiser() = default;
 
-Image Denoiser::denoise(const Image& rgb, const Image* albedo, const Image* normal, bool clean_guides) {
-  check_images(rgb, albedo, normal);
+Image Denoiser::denoise(Image rgb, const Image* albedo, const Image* normal, bool clean_guides) {
+  return denoise(std::move(rgb), copy_of(albedo), copy_of(normal), clean_guides);
+}
+
+Image Denoiser::denoise(Image rgb, std::shared_ptr<const Image> albedo, std::shared_ptr<const Image> normal,
+                        bool clean_guides) {
+  check_images(rgb, albedo.get(), normal.get());
   const auto run = std::make_shared<Run>();
   run->library = library_, run->hdr = true, run->clean_guides = clean_guides && albedo;
-  run->inputs.emplace_back("color", with_usable_values(rgb));
-  if (albedo) run->inputs.emplace_back("albedo", finite(*albedo));
-  if (normal) run->inputs.emplace_back("normal", finite(*normal));
+  run->inputs.emplace_back("color", std::make_shared<const Image>(with_usable_values(std::move(rgb))));
+  if (albedo) run->inputs.emplace_back("albedo", finite(albedo));
+  if (normal) run->inputs.emplace_back("normal", finite(normal));
   ++runs_;
   return image_of(run);
 }
@@ -292,7 +303,7 @@ Image Denoiser::denoise_guide(const std::string& name, const Image& guide) {
   check_images(guide, nullptr, nullptr);
   const auto run = std::make_shared<Run>();
   run->library = library_;
-  run->inputs.emplace_back(name == "albedo" ? "albedo" : "normal", finite(guide));
+  run->inputs.emplace_back(name == "albedo" ? "albedo" : "normal", finite(copy_of(&guide)));
   run->small_network = true;
   ++runs_;
   return image_of(run);

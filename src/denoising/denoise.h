@@ -37,7 +37,10 @@ class Denoiser {
   /// (filters/stray_values.h), those of guides that are not finite set to zero. Throws
   /// Error(kInput) if sizes differ, and Error(kIo) if the library fails. Inside run_stoppable() it returns at once when
   /// stopped; the library's own work ends in the background at its next step (core/detached_work.h).
-  Image denoise(const Image& rgb, const Image* albedo, const Image* normal, bool clean_guides = false);
+  Image denoise(Image rgb, const Image* albedo, const Image* normal, bool clean_guides = false);
+  /// The same without copies of guides whose values are finite; the library may hold them after it was stopped.
+  Image denoise(Image rgb, std::shared_ptr<const Image> albedo, std::shared_ptr<const Image> normal,
+                bool clean_guides = false);
   /// Prefilters a guide for use with `clean_guides`. `name`: "albedo" or "normal".
   Image denoise_guide(const std::string& name, const Image& guide);
   /// Number of images and guides denoised so far.

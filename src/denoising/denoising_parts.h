@@ -50,6 +50,9 @@ DenoisingParts parts_of_pair(const Estimator& base, const GroupedImage& crn, con
 /// groups. A half of a single group takes its variance from all groups, of the surrounding pixels alone. Fireflies are
 /// limited within each part, so that halves stay independent.
 DenoisingParts parts_of_mean(const GroupedImage& independent);
+/// Radius of influence of the samples on the parts of a mean, in rows; and on the pixels that a two-pass estimator
+/// fills in for those that are left out.
+inline constexpr int kMeanReach = 8, kFilledReach = 4;
 /// The same without halves, for any number of groups. The standard error of a single group is 0.
 DenoisingParts whole_of_mean(const GroupedImage& independent);
 

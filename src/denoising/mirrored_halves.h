@@ -11,7 +11,6 @@
 
 #include <functional>
 #include <span>
-#include <vector>
 
 #include "film/film.h"
 
@@ -19,11 +18,10 @@ namespace covary {
 
 /// The axis whose order is reversed.
 enum class Mirror { kNone, kColumns, kRows };
-Image mirrored(const Image& image, Mirror mirror);
+Image mirrored(Image image, Mirror mirror);
 
-/// `denoise(image, mirror)` denoises a mirrored image. `images`: all samples, or all samples and both halves. The
-/// results have the original order of pixels; the first is the average above if there are halves.
-std::vector<Image> denoise_with_halves(std::span<const Image* const> images,
-                                       const std::function<Image(const Image& image, Mirror mirror)>& denoise);
+/// `denoise(image, mirror)` denoises a mirrored image. `images`: all samples, or all samples and both halves; receives
+/// the results, in the original order of pixels. The first is the average above if there are halves.
+void denoise_with_halves(std::span<Image> images, const std::function<Image(Image image, Mirror mirror)>& denoise);
 
 }  // namespace covary

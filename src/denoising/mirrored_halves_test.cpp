@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 namespace covary::mirrored_halves_test {
 namespace {
 
@@ -15,8 +17,7 @@ Image constant(float value) {
 }
 
 /// A denoiser with an error of 4 in the first column and of 8 in the first row of the image it is given.
-Image wrong_at_the_edges(const Image& image, Mirror) {
-  Image result = image;
+Image wrong_at_the_edges(Image result, Mirror) {
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x)
       for (int c = 0; c < 3; ++c) result.pixel(x, y)[c] += (x == 0 ? 4.0f : 0.0f) + (y == 0 ? 8.0f : 0.0f);
@@ -34,10 +35,8 @@ TEST(MirroredHalves, TurnsPixelsOver) {
 }
 
 TEST(MirroredHalves, SpreadWhatTheDenoiserErrsOverPlaces) {
-  const Image whole = constant(2), a = constant(1), b = constant(3);
-  const Image* const images[] = {&whole, &a, &b};
-  const std::vector<Image> results = denoise_with_halves(images, wrong_at_the_edges);
-  ASSERT_EQ(results.size(), 3u);
+  std::array<Image, 3> results = {constant(2), constant(1), constant(3)};
+  denoise_with_halves(results, wrong_at_the_edges);
   EXPECT_EQ(results[1].pixel(kWidth - 1, 1)[0], 1 + 4) << "columns of the first half are in reverse order";
   EXPECT_EQ(results[1].pixel(1, 0)[0], 1 + 8);
   EXPECT_EQ(results[2].pixel(0, 1)[0], 3 + 4);
@@ -51,9 +50,8 @@ TEST(MirroredHalves, SpreadWhatTheDenoiserErrsOverPlaces) {
 
 TEST(MirroredHalves, LeavesASingleImageAsItIsDenoised) {
   const Image whole = constant(2);
-  const Image* const images[] = {&whole};
-  const std::vector<Image> results = denoise_with_halves(images, wrong_at_the_edges);
-  ASSERT_EQ(results.size(), 1u);
+  std::array<Image, 1> results = {whole};
+  denoise_with_halves(results, wrong_at_the_edges);
   EXPECT_EQ(results[0].data, wrong_at_the_edges(whole, Mirror::kNone).data);
 }
 

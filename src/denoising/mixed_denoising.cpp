@@ -12,14 +12,11 @@
 #include "core/error.h"
 #include "denoising/denoise.h"
 #include "denoising/layers.h"
+#include "denoising/mixed_rows.h"
 #include "denoising/mixture.h"
 #include "denoising/parts_mixture.h"
+#include "denoising/rows_denoising.h"
 #include "estimators/mean.h"
-#include "risk/held_out_bias.h"
-#include "risk/held_out_error.h"
-#include "risk/image_risk.h"
-#include "risk/predicted_error.h"
-#include "risk/relative_weight.h"
 
 namespace covary {
 namespace {
@@ -43,35 +40,6 @@ ModeSettings settings_of(DenoiseMode mode) {
 /// 12 groups; for a mean, the means without fireflies and regression; with the network, its own and its candidates.
 constexpr double kBytesPerPixel = 440, kBytesOfMean = 340, kBytesWithOidn = 1250;
 
-/// relMSE of the base image, from its standard error.
-double risk_of_base(const DenoisingPart& part, const Image& guide, const std::vector<unsigned char>& valid) {
-  double sum = 0, n = 0;
-  for (size_t i = 0; i < valid.size(); ++i) {
-    if (!valid[i]) continue;
-    const float weight = relative_weight(&guide.data[3 * i]);
-    for (size_t c = 0; c < 3; ++c) sum += weight * sqr(part.image.std_error.data[3 * i + c]);
-    n += 3;
-  }
-  return n > 0 ? sum / n : 0;
-}
-
-/// relMSE of the mixture, the base and each candidate: the mixture's prediction plus differences that held-out samples
-/// measure.
-MeasuredRisks risks_of(const DenoisingParts& parts, const std::array<CandidateSet, 2>& halves,
-                       const std::vector<std::string>& names, const HeldOutInput& mixture, double predicted) {
-  const HalvesRisk mixed = risk_of_halves(mixture);
-  MeasuredRisks risks{.held_out = mixed.of_whole(), .bias_share = 0, .images = {}};
-  if (predicted > 0) risks.bias_share = std::clamp(1 - 0.5 * mixed.variance / predicted, 0.0, 1.0);
-  risks.images.push_back({parts.name, risk_of_base(parts.whole, *mixture.guide, parts.valid)});
-  for (size_t p = 0; p < names.size(); ++p) {
-    HeldOutInput candidate = mixture;
-    candidate.halves = {&halves[0].candidates[p], &halves[1].candidates[p]};
-    const HalvesRisk risk = risk_of_halves(candidate);
-    risks.images.push_back({names[p], std::max(predicted + risk.of_whole() - mixed.of_whole(), 0.5 * risk.variance)});
-  }
-  return risks;
-}
-
 /// The denoised layers of a mean.
 std::vector<Image> layers_of(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
                              const MixedDenoising& mixture, std::span<const Layer> layers) {
@@ -85,19 +53,6 @@ int runs_of(const std::vector<CandidateMaker>& makers) {
   int runs = 0;
   for (const CandidateMaker& maker : makers) runs += maker.runs ? maker.runs() : 0;
   return runs;
-}
-
-/// HeldOutInput::error_over_variance
-double usual_error(const std::vector<CandidateMaker>& makers) {
-  double usual = 0.5;
-  for (const CandidateMaker& maker : makers) usual = std::max(usual, maker.error_over_variance);
-  return usual;
-}
-
-ErrorKind kind_of(const std::vector<CandidateMaker>& makers, bool is_mean) {
-  const bool network = has_network(makers);
-  if (is_mean) return network ? ErrorKind::kNetwork : ErrorKind::kFilters;
-  return network ? ErrorKind::kPairNetwork : ErrorKind::kPairFilters;
 }
 
 void check_guides(const Guides& guides) {
@@ -171,36 +126,18 @@ void use_history(const MixingHistory& use, const DenoisingParts& parts, const st
 MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<CandidateMaker>& makers, DenoiseMode mode,
                                   bool std_error, std::span<const Layer> layers, const MixingHistory& history) {
   const PartsWeighting chosen = settings_of(mode).weighting;
-  const std::vector<unsigned char>& valid = parts.valid;
+  const bool has_history = history.before || history.keep_samples;
   MixedParts mixed = mix_parts(parts, makers, chosen);
-  Mixture& mixture = mixed.mixture;
-  const std::array<const Image*, 2> images = {&mixture.halves[0], &mixture.halves[1]};
-  const std::array<const Moments*, 2> independent = {&parts.halves[0].independent, &parts.halves[1].independent};
-  Image place;
-  if (std_error || history.before || history.keep_samples)  // all of these need an error
-    place = disagreement(mixed.whole, guide_of(mixed.whole), mixture.image, valid);
-  const HeldOutInput held_out{images, independent, &guide_of(mixed.whole), &valid, usual_error(makers), &place};
-
   MixedDenoising out;
-  for (const CandidateMaker& maker : makers) out.names.insert(out.names.end(), maker.names.begin(), maker.names.end());
+  out.names = names_of(makers);
   EstimatorResult& result = out.result;
-  result.nonfinite_pixels = parts.whole.image.nonfinite_pixels;
-  result.estimate = mixture.image;
-  if (std_error) {
-    result.std_error = held_out_error(held_out);
-    result.bias =
-        held_out_bias({images, {&guide_of(mixed.halves[0]), &guide_of(mixed.halves[1])}, independent, &valid});
-    result.risk_rows = image_risk({&result.estimate, images, &parts.whole.independent, independent, &parts.groups,
-                                   &guide_of(mixed.whole), &valid, parts.guides});
-    result.risk_kind = kind_of(makers, parts.is_mean);
-    result.risks = risks_of(parts, mixed.halves, out.names, held_out, predicted_relmse(result));
+  result = finish(mixed_rows(parts, mixed, makers, std_error || has_history), makers, parts.name);
+  if (has_history) {  // last: the error above is that of the frame alone
+    use_history(history, parts, makers, chosen, result.std_error, mixed, result.kept_samples);
+    result.estimate = std::move(mixed.mixture.image);
   }
-  if (history.before || history.keep_samples) {  // last: the error above is that of the frame alone
-    const Image frame_error = std_error ? result.std_error : held_out_error(held_out);
-    use_history(history, parts, makers, chosen, frame_error, mixed, result.kept_samples);
-    result.estimate = std::move(mixture.image);
-  }
-  out.weights = std::move(mixture.weights);
+  if (!std_error) result.std_error = {}, result.bias = {}, result.risk_rows.clear(), result.risks.reset();
+  out.weights = std::move(mixed.mixture.weights);
   out.candidates = std::move(mixed.whole.candidates);
   result.layers = layers_of(parts, makers, out, layers);
   result.network_runs = runs_of(makers);
@@ -225,7 +162,7 @@ MixedDenoising single_candidate(const GroupedImage& independent, const std::vect
   DenoisingParts parts = whole_of_mean(independent);
   CandidateSet set = std::move(candidates_of({&parts.whole}, parts.valid, makers)[0]);
   MixedDenoising out;
-  for (const CandidateMaker& maker : makers) out.names.insert(out.names.end(), maker.names.begin(), maker.names.end());
+  out.names = names_of(makers);
   const size_t best = static_cast<size_t>(makers[0].best_of_few);
   out.result = parts.whole.image;
   out.result.std_error = Image();
@@ -287,9 +224,9 @@ Run run_of_pair(const Estimator& base, const MixedDenoisingOptions& options, boo
 /// frame is, which limits what previous frames may change (docs/notes/sequences.md).
 constexpr double kManySamples = 64;
 
-FilterKinds kinds_for(const GroupedImage& image, bool with_network, const MixingHistory& history) {
+FilterKinds kinds_for(double samples, bool with_network, const MixingHistory& history) {
   if (with_network) return FilterKinds::kNlMeans;
-  const bool worth_it = mean_samples(image) >= kManySamples || history.before;
+  const bool worth_it = samples >= kManySamples || history.before;
   return worth_it ? FilterKinds::kAll : FilterKinds::kRegression;
 }
 
@@ -298,10 +235,69 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
     check_guides(settings.guides);
     std::vector<CandidateMaker> makers;
     if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn, CandidateBase::kMean));
-    makers.push_back(
-        filtered_candidates(settings.guides, CandidateBase::kMean, kinds_for(independent, with_oidn, options.history)));
+    const FilterKinds kinds = kinds_for(mean_samples(independent), with_oidn, options.history);
+    makers.push_back(filtered_candidates(settings.guides, CandidateBase::kMean, kinds));
     if (!can_be_mixed(independent)) return single_candidate(independent, makers, settings.layers);
     return denoise_frame(parts_of_mean(independent), makers, options, settings, settings.layers);
+  };
+}
+
+/// The same for images in rows, without history and layers.
+RowsMethod rows_of_mean(const MixedDenoisingOptions& options) {
+  RowsMethod method;
+  method.reach_of_parts = kMeanReach;
+  method.parts = [](const PairInRows::Rows& rows, const PairSettings& settings) {
+    DenoisingParts parts = parts_of_mean(rows.independent);
+    parts.guides = settings.guides;
+    return parts;
+  };
+  method.filters = [options](const Guides& guides, int first_row, double samples) {
+    const FilterKinds kinds = kinds_for(samples, options.use_oidn, {});
+    return filtered_candidates(guides, CandidateBase::kMean, kinds, first_row);
+  };
+  method.are_enough = [](const PairInRows::Rows& rows) { return can_be_mixed(rows.independent); };
+  method.of_few = [](const PairInRows::Rows& rows, const PairSettings&, const std::vector<CandidateMaker>& makers) {
+    return single_candidate(rows.independent, makers, {}).result;
+  };
+  return method;
+}
+
+RowsMethod rows_of_pair(const Estimator& base) {
+  RowsMethod method;
+  method.base = CandidateBase::kPair;
+  method.reach_of_parts = base.reach + kFilledReach;
+  method.parts = [base](const PairInRows::Rows& rows, const PairSettings& settings) {
+    DenoisingParts parts = parts_of_pair(base, rows.crn, rows.independent, settings);
+    parts.guides = settings.guides;
+    return parts;
+  };
+  method.filters = [](const Guides& guides, int first_row, double) {
+    return filtered_candidates(guides, CandidateBase::kPair, FilterKinds::kNlMeans, first_row);
+  };
+  method.are_enough = [n = 2 * base.fewest_groups](const PairInRows::Rows& rows) {
+    return std::min(rows.crn.groups, rows.independent.groups) >= n;
+  };
+  method.of_few = [run = run_of_pair(base, {}, false)](const PairInRows::Rows& rows, const PairSettings& settings,
+                                                       const std::vector<CandidateMaker>&) {
+    return run(rows.crn, rows.independent, settings).result;
+  };
+  return method;
+}
+
+/// Lets the estimator work on rows of images that are too large for memory.
+void allow_rows(const Estimator& base, const MixedDenoisingOptions& options, bool with_oidn, Estimator& estimator) {
+  estimator.reach = -1;
+  if (base.reach < 0 || options.history.before || options.history.keep_samples) return;
+  MixedDenoisingOptions used = options;
+  used.use_oidn = with_oidn;
+  RowsMethod method = is_mean(base) ? rows_of_mean(used) : rows_of_pair(base);
+  method.weighting = settings_of(options.mode).weighting;
+  if (with_oidn) method.network = options.oidn;
+  estimator.reach = rows_reach(method);
+  estimator.memory.of_whole = bytes_of_whole(with_oidn);
+  estimator.apply_in_rows = [method](const PairInRows& image, const PairSettings& settings) {
+    check_guides(settings.guides);
+    return denoise_in_rows(image, settings, method);
   };
 }
 
@@ -326,7 +322,7 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
   estimator.text += fmt::format(" --denoise {}{}", settings_of(options.mode).name, with_oidn ? "" : " --oidn off");
   estimator.fewest_groups = 2 * base.fewest_groups;
   estimator.reads_guides = true;
-  estimator.reach = -1;
+  allow_rows(base, options, with_oidn, estimator);
   estimator.explain = nullptr;
   estimator.memory.always += with_oidn ? kBytesWithOidn : kBytesPerPixel + (is_mean(base) ? kBytesOfMean : 0);
   estimator.memory.of_halves = estimator.memory.of_halves_per_group = 0;  // part of that

@@ -18,7 +18,6 @@ using namespace lanes;
 
 /// Sums of normal equations, a pixel per lane; the last is v, the variance of the halves' U_p, summed over p.
 using Sums = std::array<vfloat, n_normal_sums(kMostCandidates)>;
-using Weights = std::array<float, kMostCandidates>;
 
 /// Adds the normal equations of one pixel to `sums`, in 1 / (squared radiance).
 void add_pixel(const MixtureInput& in, int m, int x, int y, float* sums) {
@@ -57,29 +56,6 @@ void add_pixel(const MixtureInput& in, int m, int x, int y, float* sums) {
     for (int c = 0; c < 3; ++c) sums[plane] += variance * sqr(u[0][p][c] - u[1][p][c]);
 }
 
-/// x0: the best weights for the whole image if all pixels have the same.
-Weights weights_everywhere(const MixtureInput& in, int m) {
-  const int width = in.guide->width, height = in.guide->height;
-  std::vector<std::array<float, std::tuple_size_v<Sums>>> rows(static_cast<size_t>(height));
-  parallel_for(height, 8, [&](int y) {
-    for (int x = 0; x < width; ++x)
-      if ((*in.valid)[static_cast<size_t>(y) * width + x]) add_pixel(in, m, x, y, rows[static_cast<size_t>(y)].data());
-  });
-  Sums sums{};
-  for (int i = 0; i < n_normal_sums(m); ++i) {
-    double sum = 0;
-    for (const auto& row : rows) sum += row[i];
-    sums[i] = splat(static_cast<float>(sum));
-  }
-  std::array<vfloat, kMostCandidates + 1> x;
-  Weights usual{};
-  std::copy(in.usual.begin(), in.usual.end(), usual.begin());
-  solve_mixture(m, sums.data(), usual.data(), in.usual_count, x.data());
-  Weights weights{};
-  for (int p = 0; p < m; ++p) weights[p] = x[p][0];
-  return weights;
-}
-
 /// base + sum_p x_p (candidate_p - base) at valid pixels, otherwise base.
 Image mixed(const CandidateSet& set, const std::vector<Image>& weights, const std::vector<unsigned char>& valid) {
   Image result = set.base;
@@ -98,7 +74,46 @@ Image mixed(const CandidateSet& set, const std::vector<Image>& weights, const st
   return result;
 }
 
+int n_candidates(const MixtureInput& in) { return static_cast<int>(in.halves[0]->candidates.size()); }
+
 }  // namespace
+
+std::vector<SampledRows> sampled_rows(int width, int height) {
+  if (static_cast<double>(width) * height <= kMostSampledPixels) return {{0, height}};
+  const double rows = std::max(1.0, std::round(kMostSampledPixels / width / kSampledBlocks));
+  std::vector<SampledRows> blocks;
+  for (int i = 0; i < kSampledBlocks; ++i) {
+    const int first = static_cast<int>((i + 0.5) * height / kSampledBlocks - rows / 2);
+    blocks.push_back({std::max(0, first), std::min(height, first + static_cast<int>(rows))});
+  }
+  return blocks;
+}
+
+std::vector<NormalRow> normal_rows(const MixtureInput& in, int first, int end) {
+  std::vector<NormalRow> rows(static_cast<size_t>(end - first));
+  const int width = in.halves[0]->base.width, m = n_candidates(in);
+  parallel_for(end - first, 8, [&](int i) {
+    const int y = first + i;
+    for (int x = 0; x < width; ++x)
+      if ((*in.valid)[static_cast<size_t>(y) * width + x]) add_pixel(in, m, x, y, rows[static_cast<size_t>(i)].data());
+  });
+  return rows;
+}
+
+std::vector<float> weights_everywhere(const MixtureInput& in, int m, const std::vector<NormalRow>& rows) {
+  Sums sums{};
+  for (int i = 0; i < n_normal_sums(m); ++i) {
+    double sum = 0;
+    for (const NormalRow& row : rows) sum += row[static_cast<size_t>(i)];
+    sums[i] = splat(static_cast<float>(sum));
+  }
+  std::array<vfloat, kMostCandidates + 1> x;
+  std::vector<float> usual(kMostCandidates), weights(kMostCandidates);
+  std::copy(in.usual.begin(), in.usual.end(), usual.begin());
+  solve_mixture(m, sums.data(), usual.data(), in.usual_count, x.data());
+  for (int p = 0; p < m; ++p) weights[p] = x[p][0];
+  return weights;
+}
 
 Image disagreement(const CandidateSet& set, const Image& guide, const Image& image,
                    const std::vector<unsigned char>& valid) {
@@ -140,7 +155,16 @@ Mixture mix(const MixtureInput& input) {
                           [&](int x, int y, float* sums) { add_pixel(input, m, x, y, sums); });
   Mixture mixture;
   mixture.weights.assign(m, Image(width, height, 1));
-  const Weights everywhere = input.prior > 0 ? weights_everywhere(input, m) : Weights{};
+  std::vector<float> everywhere = input.everywhere;
+  if (everywhere.empty() && input.prior > 0) {
+    std::vector<NormalRow> rows;
+    for (const auto& [first, end] : sampled_rows(width, height)) {
+      const std::vector<NormalRow> block = normal_rows(input, first, end);
+      rows.insert(rows.end(), block.begin(), block.end());
+    }
+    everywhere = weights_everywhere(input, m, rows);
+  }
+  everywhere.resize(kMostCandidates);
   for_each_batch(width, height, [&](int x, int y, int n) {
     Sums sums;
     cells.sum(x, y, sums.data());

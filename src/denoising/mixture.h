@@ -21,7 +21,7 @@
 // Where these sums are mostly noise, weights are shrunk towards x0, those of the whole image: prior * v ||x - x0||^2 is
 // added, with v the mean variance of the U_p, which vanishes with more samples. x0 in turn is shrunk towards typical
 // weights x1 by usual_count * v ||x0 - x1||^2, summed over the whole image, because halves of few samples overrate
-// smooth images.
+// smooth images. Of large images, x0 is that of a sample of rows (in_sample()).
 //
 // The mixture of all samples has half that variance, which suggests bias_share = 2; but its bias is also smaller than
 // that of a half, and 1 gives less error (docs/notes/denoising.md).
@@ -54,7 +54,26 @@ struct MixtureInput {
   float usual_count = 0;  ///< weight of the prior towards these, >= 0
   /// Weights of each half's squared errors per pixel, one channel, made of the same half; null: 1 / (F'_A^2 + 0.01).
   std::array<const Image*, 2> counts = {};
+  /// x0, if these are rows of a larger image; empty: of the rows of this image in the sample.
+  std::vector<float> everywhere;
 };
+
+/// The normal equations of a row, summed over its pixels.
+using NormalRow = std::array<float, n_normal_sums(kMostCandidates)>;
+/// Those of rows first … end - 1. The input needs no image of all samples.
+std::vector<NormalRow> normal_rows(const MixtureInput& input, int first, int end);
+/// x0 from the sample's rows, with the input's prior towards `usual`; `m`: number of candidates.
+std::vector<float> weights_everywhere(const MixtureInput& input, int m, const std::vector<NormalRow>& rows);
+
+/// Rows first … end - 1 of an image.
+struct SampledRows {
+  int first = 0, end = 0;
+};
+/// The rows that determine x0: all, or of an image of more than kMostSampledPixels pixels, kSampledBlocks blocks,
+/// evenly distributed.
+std::vector<SampledRows> sampled_rows(int width, int height);
+inline constexpr double kMostSampledPixels = 1 << 21;
+inline constexpr int kSampledBlocks = 8;
 
 struct Mixture {
   Image image;

@@ -213,10 +213,11 @@ double t_of_prediction(float bias, bool held_out) {
     // Held out: the other half's samples. Otherwise, as a planted bug, each image is compared with its own samples.
     const Moments own[2] = {moments_of(a, 0.002f), moments_of(b, 0.002f)};
     const Image error =
-        held_out_error({{&a, &b},
-                        {held_out ? &e.independent[0] : &own[0], held_out ? &e.independent[1] : &own[1]},
-                        &e.guide,
-                        &e.valid});
+        held_out_error(held_out_parts({{&a, &b},
+                                       {held_out ? &e.independent[0] : &own[0], held_out ? &e.independent[1] : &own[1]},
+                                       &e.guide,
+                                       &e.valid}),
+                       {});
     const Image whole = average(a, b);
     double difference = 0;
     for (size_t i = 0; i < whole.data.size(); ++i)
@@ -239,7 +240,8 @@ TEST(HeldOutError, IsTheUsualOneWhereHeldOutSamplesAreNoise) {
   Experiment e(5);
   for (int c = 0; c < 3; ++c) e.independent[0].mean.row(c, 20)[30] += 30;  // a firefly
   const Image a = flat(0, 0.002, 11), b = flat(0, 0.002, 12);
-  const Image error = held_out_error({{&a, &b}, {&e.independent[0], &e.independent[1]}, &e.guide, &e.valid, 0.65});
+  const Image error =
+      held_out_error(held_out_parts({{&a, &b}, {&e.independent[0], &e.independent[1]}, &e.guide, &e.valid}), {}, 0.65);
   double sum = 0;
   for (const float value : error.data) sum += value * value;
   const double over_variance = sum / static_cast<double>(error.data.size()) / 0.002;
@@ -250,8 +252,8 @@ TEST(HeldOutError, IsTheUsualOneWhereHeldOutSamplesAreNoise) {
 TEST(HeldOutError, IsWhereImagesDisagreeAndAsLargeInAll) {
   const Experiment e(6);
   const Image a = flat(0, 0.002, 13), b = flat(0, 0.002, 14);
-  HeldOutInput input{{&a, &b}, {&e.independent[0], &e.independent[1]}, &e.guide, &e.valid};
-  const Image before = held_out_error(input);
+  const HeldOutParts parts = held_out_parts({{&a, &b}, {&e.independent[0], &e.independent[1]}, &e.guide, &e.valid});
+  const Image before = held_out_error(parts, {});
   Image image = flat(0, 0, 0), candidate = image;  // a disagreement of 0.1 on the left, of 0.4 on the right
   for (int y = 0; y < kSize; ++y)
     for (int x = 0; x < kSize; ++x)
@@ -261,8 +263,7 @@ TEST(HeldOutError, IsWhereImagesDisagreeAndAsLargeInAll) {
   EXPECT_NEAR(*place.pixel(1, 1), of_left, 1e-6f);
   const Image beside = disagreement({{}, {image, candidate}}, e.guide, image, e.valid);
   EXPECT_NEAR(*beside.pixel(1, 1), std::sqrt(of_left / 60 * of_left), 1e-6f) << "at least 1/30 of their mean";
-  input.disagreement = &place;
-  const Image after = held_out_error(input);
+  const Image after = held_out_error(parts, place);
   double sums[2] = {}, ends[2] = {};
   for (int y = 0; y < kSize; ++y) {
     for (int x = 0; x < kSize; ++x) sums[0] += sqr(before.pixel(x, y)[0]), sums[1] += sqr(after.pixel(x, y)[0]);

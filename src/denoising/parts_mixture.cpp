@@ -45,8 +45,8 @@ Image counts_of(const DenoisingPart& part, const Image& guide) {
   return counts;
 }
 
-float count_of_usual(const GroupedImage& image) {
-  return kCountOfUsual * static_cast<float>(std::min(1.0, kSamplesOfUsual / std::max(mean_samples(image), 1.0)));
+float count_of_usual(double samples) {
+  return kCountOfUsual * static_cast<float>(std::min(1.0, kSamplesOfUsual / std::max(samples, 1.0)));
 }
 
 /// The typical weights of the candidates, with a sum of 1; empty if none is known.
@@ -96,11 +96,15 @@ void limit_by_network(const CandidateInput& in, CandidateSet& set) {
 
 }  // namespace
 
-double mean_samples(const GroupedImage& image) {
+double all_samples(const GroupedImage& image) {
   double samples = 0;
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) samples += image.count(x, y);
-  return samples / (static_cast<double>(image.width) * image.height);
+  return samples;
+}
+
+double mean_samples(const GroupedImage& image) {
+  return all_samples(image) / (static_cast<double>(image.width) * image.height);
 }
 
 bool has_network(const std::vector<CandidateMaker>& makers) {
@@ -115,13 +119,14 @@ CandidateInput input_of(const DenoisingPart& part, const Image& h, const std::ve
 
 std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>& parts,
                                         const std::vector<unsigned char>& valid,
-                                        const std::vector<CandidateMaker>& makers) {
+                                        const std::vector<CandidateMaker>& makers, int first) {
   std::deque<Image> h;
   std::vector<CandidateInput> inputs;
   std::vector<CandidateSet> sets;
   for (const DenoisingPart* part : parts) {
     h.push_back(mean_image(part->independent));
     inputs.push_back(input_of(*part, h.back(), valid));
+    inputs.back().part = first + static_cast<int>(sets.size());
     sets.push_back({part->image.estimate, {}});
   }
   for (const CandidateMaker& maker : makers) {
@@ -134,25 +139,65 @@ std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>&
   return sets;
 }
 
-MixedParts mix_parts(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
-                     const PartsWeighting& chosen) {
-  std::vector<CandidateSet> sets =
-      candidates_of({&parts.whole, &parts.halves[0], &parts.halves[1]}, parts.valid, makers);
-  MixedParts mixed{std::move(sets[0]), {std::move(sets[1]), std::move(sets[2])}, {}, {}};
+namespace {
+
+constexpr int kCellsReach = 32;  // of guided_cells.h
+
+/// The prior of the weights.
+void set_prior(bool is_mean, const std::vector<CandidateMaker>& makers, const PartsWeighting& chosen, double samples,
+               MixtureInput& input) {
+  input.prior = is_mean ? kPriorOfMean : chosen.prior;
+  if (is_mean) input.usual = usual_weights(makers);
+  if (!input.usual.empty()) input.usual_count = count_of_usual(samples);
+}
+
+/// What the weights follow from: both halves.
+MixtureInput input_of_halves(const DenoisingParts& parts, const PartsWeighting& chosen, MixedParts& mixed) {
   MixtureInput input;
-  input.whole = &mixed.whole;
   input.halves = {&mixed.halves[0], &mixed.halves[1]};
   input.independent = {&parts.halves[0].independent, &parts.halves[1].independent};
-  input.guide = &guide_of(mixed.whole);
   input.valid = &parts.valid;
   input.bias_share = chosen.bias_share;
-  input.prior = parts.is_mean ? kPriorOfMean : chosen.prior;
-  if (parts.is_mean) input.usual = usual_weights(makers);
-  if (!input.usual.empty()) input.usual_count = count_of_usual(parts.groups);
   for (int half = 0; parts.is_mean && half < 2; ++half) {
     mixed.counts[half] = counts_of(parts.halves[half], guide_of(mixed.halves[half]));
     input.counts[half] = &mixed.counts[half];
   }
+  return input;
+}
+
+}  // namespace
+
+int mixture_reach(bool is_mean, const PartsWeighting& chosen) {
+  return kCellsReach + (chosen.residual_correction && !is_mean ? residual_correction_reach({}) : 0);
+}
+
+std::vector<NormalRow> normal_rows_of(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
+                                      const PartsWeighting& chosen, int first, int end) {
+  std::vector<CandidateSet> sets = candidates_of({&parts.halves[0], &parts.halves[1]}, parts.valid, makers, 1);
+  MixedParts mixed{{}, {std::move(sets[0]), std::move(sets[1])}, {}, {}};
+  return normal_rows(input_of_halves(parts, chosen, mixed), first, end);
+}
+
+std::vector<float> weights_of_whole(bool is_mean, const std::vector<CandidateMaker>& makers,
+                                    const PartsWeighting& chosen, double samples, const std::vector<NormalRow>& rows) {
+  MixtureInput input;
+  set_prior(is_mean, makers, chosen, samples, input);
+  if (input.prior == 0) return {};
+  size_t m = 0;
+  for (const CandidateMaker& maker : makers) m += maker.names.size();
+  return weights_everywhere(input, static_cast<int>(m), rows);
+}
+
+MixedParts mix_parts(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
+                     const PartsWeighting& chosen, const WholeImage* whole) {
+  std::vector<CandidateSet> sets =
+      candidates_of({&parts.whole, &parts.halves[0], &parts.halves[1]}, parts.valid, makers);
+  MixedParts mixed{std::move(sets[0]), {std::move(sets[1]), std::move(sets[2])}, {}, {}};
+  MixtureInput input = input_of_halves(parts, chosen, mixed);
+  input.whole = &mixed.whole;
+  input.guide = &guide_of(mixed.whole);
+  set_prior(parts.is_mean, makers, chosen, whole ? whole->samples : mean_samples(parts.groups), input);
+  if (whole) input.everywhere = whole->everywhere;
   Mixture& mixture = mixed.mixture = mix(input);
   if (chosen.residual_correction && !parts.is_mean) {
     add_residual_correction(parts.whole.independent, {}, parts.valid, parts.whole.image.std_error, mixture.image);

@@ -27,21 +27,40 @@ struct MixedParts {
 /// The input for candidates of a part. `h`: mean of its independent image. The arguments must outlive the result.
 CandidateInput input_of(const DenoisingPart& part, const Image& h, const std::vector<unsigned char>& valid);
 
-/// Each part's image and candidates.
+/// Each part's image and candidates. The parts are all samples, both halves, or all of these; `first`: 1 for the
+/// halves.
 std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>& parts,
                                         const std::vector<unsigned char>& valid,
-                                        const std::vector<CandidateMaker>& makers);
+                                        const std::vector<CandidateMaker>& makers, int first = 0);
 
 /// The first candidate, an image with little noise.
 inline const Image& guide_of(const CandidateSet& set) { return set.candidates[0]; }
 
-/// Samples per pixel; without counts, one in each group.
+/// Samples of all pixels, and per pixel; without counts, one in each group.
+double all_samples(const GroupedImage& image);
 double mean_samples(const GroupedImage& image);
 
 /// Whether any candidates come from a neural network.
 bool has_network(const std::vector<CandidateMaker>& makers);
 
+/// What all rows of an image share.
+struct WholeImage {
+  double samples = 0;             ///< mean_samples()
+  std::vector<float> everywhere;  ///< MixtureInput::everywhere
+};
+
+/// `whole`: the image, if the parts are rows of it.
 MixedParts mix_parts(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
-                     const PartsWeighting& chosen);
+                     const PartsWeighting& chosen, const WholeImage* whole = nullptr);
+
+/// The sums over rows first … end - 1 from which WholeImage::everywhere follows.
+std::vector<NormalRow> normal_rows_of(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
+                                      const PartsWeighting& chosen, int first, int end);
+/// WholeImage::everywhere from the rows of the sample; empty if there is no prior. `samples`: mean_samples().
+std::vector<float> weights_of_whole(bool is_mean, const std::vector<CandidateMaker>& makers,
+                                    const PartsWeighting& chosen, double samples, const std::vector<NormalRow>& rows);
+
+/// Radius of influence of the candidates on the mixture, in rows; cells are aligned to multiples of kResidualCell.
+int mixture_reach(bool is_mean, const PartsWeighting& chosen);
 
 }  // namespace covary

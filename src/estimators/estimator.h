@@ -59,6 +59,17 @@ struct PairSettings {
   std::span<const Layer> layers;
 };
 
+/// A pair of images, or an independent one alone, of which only some rows are in memory at a time.
+struct PairInRows {
+  struct Rows {
+    GroupedImage crn, independent;  ///< the first is empty if there is none
+  };
+  int width = 0, height = 0;
+  int rows_at_once = 0;
+  /// Rows first … first + n - 1. The referenced memory is valid until the next call.
+  std::function<Rows(int first, int n)> rows;
+};
+
 /// Estimates a pixel from its samples and, for each, the first random numbers it was made from: [sample][dimension].
 using PixelFunction = std::function<Spectrum(std::span<const Spectrum> values, std::span<const float> coordinates)>;
 
@@ -70,6 +81,8 @@ struct EstimatorMemory {
   /// Additional memory if both images have enough groups to hold out halves: fixed, and per group.
   double of_halves = 0, of_halves_per_group = 0;
   int groups_for_halves = 0;
+  /// Of `apply_in_rows`, per pixel of the whole image, beside the result.
+  double of_whole = 0;
 
   /// Bytes for an image of `n_pixels` pixels with `groups` groups.
   double bytes(double n_pixels, int groups) const {
@@ -105,7 +118,10 @@ struct Estimator {
   // For pairs, and for independent passes in groups.
   std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings)>
       apply;
-  int reach = 0;           ///< extra rows on each side that a band of rows needs; -1: needs the whole image
+  int reach = 0;  ///< extra rows on each side that a band of rows needs; -1: needs the whole image
+  /// The result of `apply` for the whole image, with the same bits, for estimators whose bands share more than pixels;
+  /// otherwise empty. Without layers; guides are those of the whole image.
+  std::function<EstimatorResult(const PairInRows& image, const PairSettings& settings)> apply_in_rows;
   EstimatorMemory memory;  ///< memory of `apply`
   /// The control variates of a pixel; an empty function if the estimator has none.
   std::function<std::vector<ControlVariate>(const GroupedImage& crn, const GroupedImage& independent, int x, int y)>

@@ -103,18 +103,25 @@ struct Steering {
 
 class Filter {
  public:
-  Filter(std::span<const NlMeansSteering> steerings, const Planes* guides, const std::vector<unsigned char>& valid)
-      : width_(steerings[0].image->width), height_(steerings[0].image->height), guides_(guides), valid_(valid) {
+  Filter(std::span<const NlMeansSteering> steerings, const Planes* guides, const std::vector<unsigned char>& valid,
+         int first_row)
+      : width_(steerings[0].image->width),
+        height_(steerings[0].image->height),
+        first_row_(first_row),
+        guides_(guides),
+        valid_(valid) {
     COVARY_CHECK(!guides_ || guides_->border() >= kNlMeansRadius, "guides have the border that NL-means reads");
     for (const NlMeansSteering& given : steerings) add_steering(given);
     images_.resize(results_.size(), Image(width_, height_, 3));
   }
 
   std::vector<Image> run() {
-    const int columns = (width_ + kTileWidth - 1) / kTileWidth, rows = (height_ + kTileHeight - 1) / kTileHeight;
+    // Tiles are those of the whole image, so that the order of its sums does not depend on the rows that are given.
+    const int columns = (width_ + kTileWidth - 1) / kTileWidth, first = first_row_ / kTileHeight;
+    const int rows = (first_row_ + height_ + kTileHeight - 1) / kTileHeight - first;
     PerThread<Buffers> buffers;
     parallel_for(columns * rows, [&](int number) {
-      const int x = number % columns * kTileWidth, y = number / columns * kTileHeight;
+      const int x = number % columns * kTileWidth, y = (first + number / columns) * kTileHeight - first_row_;
       filter_tile({x, y, std::min(kTileWidth, width_ - x), std::min(kTileHeight, height_ - y)}, buffers.local());
     });
     return std::move(images_);
@@ -181,14 +188,15 @@ class Filter {
     b.totals.resize(tile.height * kSums * n_totals_ * kRow);
     for (int y = 0; y < tile.height; ++y) add_own(tile, y, b);
     const int most_x = std::min(kNlMeansRadius, width_ - 1), most_y = std::min(kNlMeansRadius, height_ - 1);
-    for (int band = std::max(-most_y, -tile.y); band < tile.height; band += kBand)
+    for (int band = std::max(-kNlMeansRadius, -tile.y - first_row_); band < tile.height; band += kBand)
       for (int dy = 0; dy <= most_y; ++dy) {
-        const int first = std::max(band, -dy), end = std::min({band + kBand, tile.height, height_ - tile.y - dy});
+        const int first = std::max({band, -dy, -tile.y});
+        const int end = std::min({band + kBand, tile.height, height_ - tile.y - dy});
         if (first >= end) continue;
         for (int dx = dy == 0 ? 1 : -most_x; dx <= most_x; dx += kAtOnce)
           add_pairs(tile, first, end, {dx, dy, std::min(kAtOnce, most_x + 1 - dx)}, b);
       }
-    for (int y = 0; y < tile.height; ++y) finish(tile, y, totals(b, y));
+    for (int y = std::max(0, -tile.y); y < tile.height; ++y) finish(tile, y, totals(b, y));
   }
 
   void copy_tile(const Tile& tile, Buffers& b) const {
@@ -372,7 +380,7 @@ class Filter {
     }
   }
 
-  const int width_, height_;
+  const int width_, height_, first_row_;
   const Planes* guides_;
   const std::vector<unsigned char>& valid_;
   std::vector<Steering> steerings_;
@@ -384,8 +392,8 @@ class Filter {
 }  // namespace
 
 std::vector<Image> nl_means(std::span<const NlMeansSteering> steerings, const Planes* guides,
-                            const std::vector<unsigned char>& valid) {
-  return Filter(steerings, guides, valid).run();
+                            const std::vector<unsigned char>& valid, int first_row) {
+  return Filter(steerings, guides, valid, first_row).run();
 }
 
 }  // namespace covary

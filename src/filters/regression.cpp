@@ -48,10 +48,12 @@ class Regression {
         width_(input.image->width),
         height_(input.image->height),
         columns_((width_ + kStep - 1) / kStep),
+        first_window_(input.first_row / kStep % kBandRows),
         n_terms_(3),
         n_sources_(static_cast<int>(input.sources.size())) {
     for (const Image* feature : features) n_terms_ += feature->channels;
     COVARY_CHECK(n_terms_ <= 3 + kMostFeatures, "at most kMostFeatures");
+    COVARY_CHECK(input.first_row % kRegressionCell == 0, "rows begin with a row of windows");
     first_of_position_ = n_terms_;
     if (in_.position) n_terms_ += 3;
     std::vector<const Image*> images = {in_.image, in_.std_error};
@@ -70,14 +72,16 @@ class Regression {
   }
 
   std::vector<Image> run() {
-    const int rows = (height_ + kStep - 1) / kStep;
-    std::vector<Planes> bands(static_cast<size_t>((rows + kBandRows - 1) / kBandRows));
+    // Bands are those of the whole image, so that the order of sums does not depend on the rows that are given.
+    const int end = first_window_ + (height_ + kStep - 1) / kStep;
+    std::vector<Planes> bands(static_cast<size_t>((end + kBandRows - 1) / kBandRows));
     parallel_for(static_cast<int>(bands.size()), [&](int number) {
       const FlushTiny flush;
       Planes& sums = bands[static_cast<size_t>(number)];
       sums = Planes(columns_, kBandRows * kStep, kStep * (3 * n_sources_ + 1), kBorder, 0);
-      for (int row = 0; row < std::min(kBandRows, rows - number * kBandRows); ++row)
-        for (int x = 0; x < columns_; x += kLanes) add_windows(x, number * kBandRows + row, kStep * row + 1, sums);
+      const int first = number * kBandRows;
+      for (int row = std::max(first, first_window_); row < std::min(first + kBandRows, end); ++row)
+        for (int x = 0; x < columns_; x += kLanes) add_windows(x, row - first_window_, kStep * (row - first) + 1, sums);
     });
     std::vector<Image> images(static_cast<size_t>(n_sources_), Image(width_, height_, 3));
     parallel_for(height_, 16, [&](int y) { finish(y, bands, images); });
@@ -216,14 +220,15 @@ class Regression {
 
   void finish(int y, const std::vector<Planes>& bands, std::vector<Image>& images) const {
     constexpr int kRows = kBandRows * kStep;
-    const int last = std::min((y + kBorder) / kRows, static_cast<int>(bands.size()) - 1);
+    const int place = y + first_window_ * kStep;  // counted from the first band
+    const int last = std::min((place + kBorder) / kRows, static_cast<int>(bands.size()) - 1);
     for (int x = 0; x < width_; ++x)
       for (int s = 0; s < n_sources_; ++s) {
         const float* const other = in_.others[s]->pixel(x, y);
         float total = kOfOther, sum[3];
         for (int c = 0; c < 3; ++c) sum[c] = kOfOther * other[c];
-        for (int band = std::max(0, (y - kBorder) / kRows - 1); band <= last; ++band) {
-          const int row = y - band * kRows;
+        for (int band = std::max(0, (place - kBorder) / kRows - 1); band <= last; ++band) {
+          const int row = place - band * kRows;
           if (row >= kRows + kBorder) continue;
           const auto at = [&](int c) { return bands[band].row(kStep * c + x % kStep, row)[x / kStep]; };
           for (int c = 0; c < 3; ++c) sum[c] += at(3 * s + c);
@@ -236,7 +241,7 @@ class Regression {
 
   const RegressionInput& in_;
   const std::vector<unsigned char>& valid_;
-  const int width_, height_, columns_;
+  const int width_, height_, columns_, first_window_;  // the last: of the first band, in the whole image
   int n_terms_, n_sources_, first_of_position_, first_source_;
   Planes planes_, mask_;
 };

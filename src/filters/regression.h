@@ -28,7 +28,13 @@ struct RegressionInput {
   std::vector<const Image*> sources, others;
   const Image* position = nullptr;  ///< of the surfaces, in any unit; or null
   bool coarse = false;              ///< planes around every fourth pixel of every fourth row instead
+  /// Of a larger image if these are rows of it, a multiple of kRegressionCell; rows at least kRegressionReach away from
+  /// those that are missing have the bits of the whole.
+  int first_row = 0;
 };
+
+inline constexpr int kRegressionCell = 12;   ///< the windows of both kinds begin anew
+inline constexpr int kRegressionReach = 22;  ///< radius of influence of the input on a pixel, in rows or columns
 
 /// The filtered sources. All images must have three channels, the same size and finite values; results may be negative,
 /// as models are. Linear in sources and others. `features`: up to kMostFeatures channels, with values of order 1.

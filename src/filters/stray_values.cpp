@@ -116,19 +116,18 @@ void leave_out(const std::vector<StrayValue>& strays, int first_row, int n_rows,
                   std::numeric_limits<float>::quiet_NaN());
 }
 
-Image with_usable_values(const Image& image, std::vector<StrayValue>* replaced) {
+Image with_usable_values(Image image, std::vector<StrayValue>* replaced) {
   const std::vector<unsigned char> bad = bad_pixels(image);
-  Image result = image;
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) {
       if (!bad[static_cast<size_t>(y) * image.width + x]) continue;
       if (replaced) replaced->push_back({x, y, 0, brightness(image.pixel(x, y))});
-      float* rgb = result.pixel(x, y);
+      float* rgb = image.pixel(x, y);
       std::fill_n(rgb, 3, 0.0f);
       const int farthest = std::max(image.width, image.height);
       for (int r = 1; r <= farthest && !mean_around(image, bad, x, y, r, rgb);) r *= 2;
     }
-  return result;
+  return image;
 }
 
 }  // namespace covary

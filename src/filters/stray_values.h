@@ -41,10 +41,10 @@ class StrayValues {
 /// Sets these values of rows that begin at `first_row` to NaN; `data`: as GroupedImage::data, of n_rows rows.
 void leave_out(const std::vector<StrayValue>& strays, int first_row, int n_rows, int width, int groups, float* data);
 
-/// A copy of an image with 3 channels in which pixels with values that are not usable, or stray, become the mean of the
+/// An image with 3 channels in which pixels with values that are not usable, or stray, become the mean of the
 /// others around them, in the smallest square that has some; 0 if there are none. Without another group, a value
 /// is stray if it outshines kMostOfPicture times all but the brightest kMostStrays pixels, and the eight pixels around,
 /// too. `replaced`: these pixels; may be null.
-Image with_usable_values(const Image& image, std::vector<StrayValue>* replaced = nullptr);
+Image with_usable_values(Image image, std::vector<StrayValue>* replaced = nullptr);
 
 }  // namespace covary

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/parallel.h"
 #include "filters/guided_cells.h"
@@ -72,39 +73,25 @@ HeldOutRow row_of_halves(const HeldOutInput& in, int width, int y, const Weights
   return row;
 }
 
-/// Over all rows, with the guide's weights.
-HeldOutRow sum_of_halves(const HeldOutInput& in) {
-  std::vector<HeldOutRow> rows(static_cast<size_t>(in.guide->height));
-  parallel_for(in.guide->height, 8, [&](int y) {
-    rows[static_cast<size_t>(y)] = row_of_halves(in, in.guide->width, y, [&](int x) {
-      const double weight = relative_weight(in.guide->pixel(x, y));
-      return std::array{weight, weight};
-    });
-  });
-  return sum_of(rows);
-}
-
 /// The image's squared error over half of the variance of the halves.
-double factor_of_image(const HeldOutInput& in) {
-  const HeldOutRow all = sum_of_halves(in);
-  const double trust = all.variance > 0 ? trust_in(all) : 0, usual = in.error_over_variance;
+double factor_of_image(const std::vector<HeldOutRow>& rows, double usual) {
+  const HeldOutRow all = sum_of(rows);
+  const double trust = all.variance > 0 ? trust_in(all) : 0;
   if (trust == 0) return 2 * usual;
   return 2 * usual * std::pow(error_of_whole(all) / (usual * all.variance), trust);
 }
 
-/// Makes the relative squared error of each pixel proportional to `disagreement`; the total over the image is
-/// unchanged.
-void place(const Image& disagreement, const HeldOutInput& in, Image& std_error) {
-  if (std::none_of(disagreement.data.begin(), disagreement.data.end(), [](float d) { return d > 0; })) return;
+/// Makes the relative squared error of each pixel proportional to `disagreement`. Returns the factor by which squared
+/// errors are then to be multiplied so that their total over the image is unchanged.
+double place(const Image& disagreement, const Image& weights, Image& std_error) {
+  if (std::none_of(disagreement.data.begin(), disagreement.data.end(), [](float d) { return d > 0; })) return 1;
   const int width = std_error.width;
   std::vector<std::array<double, 2>> rows(static_cast<size_t>(std_error.height));  // before and after
   parallel_for(std_error.height, 8, [&](int y) {
     auto& [before, after] = rows[static_cast<size_t>(y)];
     for (int x = 0; x < width; ++x) {
-      if (!(*in.valid)[static_cast<size_t>(y) * width + x]) continue;
       float* error = std_error.pixel(x, y);
-      const float squares = sqr(error[0]) + sqr(error[1]) + sqr(error[2]),
-                  weight = relative_weight(in.guide->pixel(x, y));
+      const float squares = sqr(error[0]) + sqr(error[1]) + sqr(error[2]), weight = *weights.pixel(x, y);
       const float wanted = *disagreement.pixel(x, y);
       if (squares > 0)
         for (int c = 0; c < 3; ++c) error[c] *= std::sqrt(wanted / (weight * squares));
@@ -113,8 +100,7 @@ void place(const Image& disagreement, const HeldOutInput& in, Image& std_error) 
   });
   double before = 0, after = 0;
   for (const auto& row : rows) before += row[0], after += row[1];
-  if (!(after > 0)) return;
-  for (float& value : std_error.data) value *= static_cast<float>(std::sqrt(before / after));
+  return after > 0 ? before / after : 1;
 }
 
 /// Each squared error is weighted by the image it belongs to, which is independent of the held-out samples.
@@ -189,15 +175,24 @@ void calibrate(EstimatorResult& result) {
   for (float& value : result.std_error.data) value *= factor;
 }
 
-HalvesRisk risk_of_halves(const HeldOutInput& input) {
-  const HeldOutRow all = sum_of_halves(input);
-  const auto n_valid =
-      static_cast<double>(std::count_if(input.valid->begin(), input.valid->end(), [](auto v) { return v != 0; }));
-  const double n_values = std::max(3 * n_valid, 1.0);
+std::vector<HeldOutRow> held_out_rows(const HeldOutInput& in) {
+  std::vector<HeldOutRow> rows(static_cast<size_t>(in.guide->height));
+  parallel_for(in.guide->height, 8, [&](int y) {
+    rows[static_cast<size_t>(y)] = row_of_halves(in, in.guide->width, y, [&](int x) {
+      const double weight = relative_weight(in.guide->pixel(x, y));
+      return std::array{weight, weight};
+    });
+  });
+  return rows;
+}
+
+HalvesRisk risk_of_halves(const std::vector<HeldOutRow>& rows, double n_valid_pixels) {
+  const HeldOutRow all = sum_of(rows);
+  const double n_values = std::max(3 * n_valid_pixels, 1.0);
   return {all.error / n_values, all.variance / n_values};
 }
 
-Image held_out_error(const HeldOutInput& input) {
+HeldOutParts held_out_parts(const HeldOutInput& input) {
   const int width = input.guide->width, height = input.guide->height;
   // Half of the variance of a half, and the number of pixels, each times the weight of relMSE.
   const GuidedCells cells(*input.guide, *input.valid, 4, [&](int x, int y, float* sums) {
@@ -206,19 +201,25 @@ Image held_out_error(const HeldOutInput& input) {
       sums[c] += 0.25f * weight * sqr(input.halves[0]->pixel(x, y)[c] - input.halves[1]->pixel(x, y)[c]);
     sums[3] += 1;
   });
-  const double factor = factor_of_image(input);
-  Image result(width, height, 3);
+  HeldOutParts parts{Image(width, height, 3), Image(width, height, 1), held_out_rows(input)};
   for_each_batch(width, height, [&](int x, int y, int n) {
     std::array<vfloat, 4> sums;
     cells.sum(x, y, sums.data());
     for (int l = 0; l < n; ++l) {
+      const float weight = *parts.weight.pixel(x + l, y) = relative_weight(input.guide->pixel(x + l, y));
       if (!(*input.valid)[static_cast<size_t>(y) * width + x + l]) continue;
-      const float scale =
-          static_cast<float>(factor) / (std::max(sums[3][l], 1e-20f) * relative_weight(input.guide->pixel(x + l, y)));
-      for (int c = 0; c < 3; ++c) result.pixel(x + l, y)[c] = std::sqrt(scale * sums[c][l]);
+      const float scale = 1 / (std::max(sums[3][l], 1e-20f) * weight);
+      for (int c = 0; c < 3; ++c) parts.relative.pixel(x + l, y)[c] = std::sqrt(scale * sums[c][l]);
     }
   });
-  if (input.disagreement) place(*input.disagreement, input, result);
+  return parts;
+}
+
+Image held_out_error(HeldOutParts parts, const Image& disagreement, double error_over_variance) {
+  Image result = std::move(parts.relative);
+  const double square_of_placed = place(disagreement, parts.weight, result);
+  const double factor = std::sqrt(factor_of_image(parts.rows, error_over_variance) * square_of_placed);
+  for (float& value : result.data) value *= static_cast<float>(factor);
   return result;
 }
 

@@ -24,16 +24,25 @@ struct HeldOutInput {
   std::array<const Moments*, 2> independent = {};     ///< h_A, h_B and the variances of their pixels
   const Image* guide = nullptr;                       ///< G of guided_cells.h
   const std::vector<unsigned char>* valid = nullptr;  ///< pixels with 0 are ignored and have no error
-  double error_over_variance = 0.5;                   ///< typical ratio of the whole's error to v; 1/2 without bias
-  /// Relative squared differences of the whole image from others made differently from the same samples, one channel;
-  /// null: none. Only used by held_out_error().
-  const Image* disagreement = nullptr;
 };
 
+/// The parts of an image's estimated error, for the whole image or for rows of it.
+struct HeldOutParts {
+  /// The standard error as far as halves show where it is, up to a factor that is the same for all pixels.
+  Image relative;
+  Image weight;                  ///< of squared errors: 1 / (G'^2 + 0.01), one channel
+  std::vector<HeldOutRow> rows;  ///< sums over each row, without `predicted`
+};
+/// Radius of influence of the input on a pixel, in rows. Cells are aligned to multiples of kResidualCell.
+inline constexpr int kHeldOutReach = 32;
+HeldOutParts held_out_parts(const HeldOutInput& input);
+
 /// The estimated standard error of an image that the same method made from both halves. These determine its size; its
-/// spatial distribution follows the disagreement, if given, because halves share their bias
-/// (docs/notes/error-estimates.md). Bit-identical for any number of threads.
-Image held_out_error(const HeldOutInput& input);
+/// spatial distribution follows `disagreement`, if given, because halves share their bias
+/// (docs/notes/error-estimates.md): relative squared differences of the whole image from others made differently from
+/// the same samples, one channel; empty: unknown. `error_over_variance`: typical ratio of the whole's error to v; 1/2
+/// without bias. Bit-identical for any number of threads.
+Image held_out_error(HeldOutParts parts, const Image& disagreement, double error_over_variance = 0.5);
 
 /// Errors of the halves' images, as means over values, each divided by G'^2 + 0.01.
 struct HalvesRisk {
@@ -42,9 +51,11 @@ struct HalvesRisk {
   /// Of the image of all samples: the bias of a half, and half of its variance.
   double of_whole() const { return error - 0.5 * variance; }
 };
-/// With the weights of the guide. Differences between images of the same halves are less noisy than the errors, because
-/// the held-out samples are the same.
-HalvesRisk risk_of_halves(const HeldOutInput& input);
+/// The sums over each row, without `predicted`, with the weights of the guide.
+std::vector<HeldOutRow> held_out_rows(const HeldOutInput& input);
+/// Differences between images of the same halves are less noisy than the errors, because the held-out samples are the
+/// same.
+HalvesRisk risk_of_halves(const std::vector<HeldOutRow>& rows, double n_valid_pixels);
 
 /// An estimator that also fills EstimatorResult::held_out and risk_rows if both halves have enough groups; only for
 /// estimators with Estimator::holds_out, others are returned unchanged.
