@@ -6,6 +6,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import tempfile
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -161,12 +162,38 @@ class Job:
         self.total, self.done = len(self.frames) * (self.groups + 1), 0
         self.output, self.verdict = "", ""
         self.warnings: list[str] = []
+        self.started = time.perf_counter()
+        self.error: float | None = None
+        self._comparing: tuple[subprocess.Popen[str], int] | None = None
 
     def text(self) -> str:
         """The current step, as text."""
         picture, step = divmod(self.done, self.groups + 1)
         frame = f"frame {self.frames[min(picture, len(self.frames) - 1)]}, " if len(self.frames) > 1 else ""
-        return frame + ("combining" if step == self.groups else f"group {step + 1} of {self.groups}")
+        text = frame + ("combining" if step == self.groups else f"group {step + 1} of {self.groups}")
+        if self.done:
+            seconds = time.perf_counter() - self.started
+            text += ", " + program.remaining(seconds / self.done * (self.total - self.done))
+        self._read_error()
+        return text + ("" if self.error is None else f", relMSE about {self.error:.2g}")
+
+    def _compare(self, files: Sequence[str]) -> None:
+        """Asks the program for the error of the groups so far, which it tells while the next one is rendered."""
+        if len(files) < 2 or self._comparing is not None:
+            return
+        command = program.comparison(self.program, files[-1], files[-2])
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                   stderr=subprocess.DEVNULL, text=True, env=program.environment())
+        self._comparing = (process, len(files))
+
+    def _read_error(self, wait: bool = False) -> None:
+        if self._comparing is None:
+            return
+        process, groups = self._comparing
+        if not wait and process.poll() is None:
+            return
+        self.error = program.read_error(process.communicate()[0], groups)
+        self._comparing = None
 
     def steps(self) -> Iterator[Rendering | Combining]:
         """The steps, one after the other. Temporary files are removed when the iterator is closed."""
@@ -185,6 +212,9 @@ class Job:
                 files[group.kind].append(path)
                 yield Rendering(self.scene, group, path)
                 self.done += 1
+                self._read_error()
+                self._compare(files["independent"])
+        self._read_error(wait=True)  # before its files are removed
         statistics, output = str(folder / "statistics.json"), str(output_of(self.scene, frame))
         combining = Combining(program.command(self.program, files, output, self.denoise, statistics), output)
         yield combining

@@ -61,6 +61,27 @@ def command(program: Path, files: Mapping[str, Sequence[str]], output: str, deno
             *files["independent"], "-o", output, "--estimator", "iicv", "--denoise", denoise, "--json", statistics]
 
 
+def comparison(program: Path, image: str, other: str) -> list[str]:
+    """Compares two groups; read_error() takes what it prints."""
+    return [str(program), "compare", image, "--reference", other, "--metric", "relmse", "--json", "-"]
+
+
+def read_error(printed: str, groups: int) -> float | None:
+    """The relMSE of the mean of as many groups, from the relMSE of two of them, which is twice that of one; None if
+    there is no number. The noise of a group is in the denominator, too, so this is a rough one."""
+    try:
+        return float(json.loads(printed)["relmse"]) / (2 * groups)
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
+def remaining(seconds: float) -> str:
+    """75 -> "1:15 left", 4000 -> "1:06:40 left"."""
+    whole = max(0, round(seconds))
+    minutes = f"{whole // 60 % 60:02}:{whole % 60:02}" if whole >= 3600 else f"{whole // 60}:{whole % 60:02}"
+    return (f"{whole // 3600}:{minutes}" if whole >= 3600 else minutes) + " left"
+
+
 def reason(messages: str) -> str:
     """The last line of a program's output, without the program's name."""
     lines = messages.strip().splitlines()

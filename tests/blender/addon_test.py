@@ -117,6 +117,13 @@ class Program(AddonTest):
         self.assertEqual(len({group.seed for group in alone}), 24)
         self.assertEqual({(group.kind, group.samples, group.guides) for group in alone}, {("independent", 8, True)})
 
+    def test_error_and_time_on_the_way(self):
+        self.assertEqual(self.program.read_error('{"image": "b.exr", "relmse": 0.06}', 3), 0.01)
+        for printed in ("", "{}", '{"relmse": null}'):
+            self.assertIsNone(self.program.read_error(printed, 3))
+        self.assertEqual([self.program.remaining(seconds) for seconds in (-1, 75, 4000)],
+                         ["0:00 left", "1:15 left", "1:06:40 left"])
+
     def test_says_where_nothing_is_gained(self):
         """Half of the samples have twice the error of all."""
         file = self.path / "statistics.json"
