@@ -14,6 +14,7 @@ from ._covary import version as __version__
 from ._images import denoise, read_groups, read_image, write_image
 from ._laboratory import Experiment, Samples, experiment
 from ._program import program
+from ._progressive import Step, render_progressively
 from ._render import Scene, render, set_threads
 from ._result import BadSample, RenderResult, Result
 from .errors import BadSamplesWarning, Error, InputError, InternalError, IoError, UsageError
@@ -24,8 +25,9 @@ from .notebook import View, view
 
 __all__ = [
     "BadSample", "BadSamplesWarning", "Error", "Experiment", "Film", "InputError", "InputReport", "InternalError",
-    "IoError", "RenderResult", "Result", "Samples", "Scene", "UsageError", "View", "__version__", "check_inputs",
-    "combine", "denoise", "errors", "experiment", "film_from_groups", "merge_films", "metrics", "program", "progress",
-    "read_groups", "read_image", "render", "scenes", "set_threads", "view", "write_image",
+    "IoError", "RenderResult", "Result", "Samples", "Scene", "Step", "UsageError", "View", "__version__",
+    "check_inputs", "combine", "denoise", "errors", "experiment", "film_from_groups", "merge_films", "metrics",
+    "program", "progress", "read_groups", "read_image", "render", "render_progressively", "scenes", "set_threads",
+    "view", "write_image",
 ]
 __all__ += _estimators

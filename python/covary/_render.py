@@ -17,6 +17,7 @@ from ._arguments import (
 )
 from ._combine import DENOISE, DenoiseMode, Progress
 from ._options import DEFAULT, declared_rules, option_texts, passes_of, text_options, underscored
+from ._page import LivePage
 from ._result import BadSample, RenderResult, text_of_bad_samples
 from .errors import BadSamplesWarning, UsageError
 from .scenes import _file_of
@@ -174,7 +175,8 @@ _DECLARED = {name: rule for name, rule in declared_rules(_covary.render_options(
                                whole(1, 65536))),
          filter=optional(choice(get_args(Filter))),
          split=optional(several("(CRN, independent), two numbers above 0", real(0, above=True), real(0, above=True))),
-         films_only=flag, progress=optional(function))
+         films_only=flag, live=either("True, False or a port from 1 to 65535", flag, whole(1, 65535)),
+         progress=optional(function))
 def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | None = None, *, integrator: str = "",
            until: float | None = None, until_p95: float | None = None, until_relative: float | None = None,
            time: float | None = None, seed: int = 0,
@@ -182,8 +184,8 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
            output: str | PathLike[str] | None = None, passes: str | PathLike[str] | None = None, resume: bool = False,
            overwrite: bool = False, checkpoint: float | None = None, preview: bool = False,
            crop: tuple[int, int, int, int] | None = None, filter: Filter | None = None,
-           split: tuple[float, float] | None = None, films_only: bool = False, progress: Progress | None = None,
-           **options: Unpack[RenderOptions]) -> RenderResult:
+           split: tuple[float, float] | None = None, films_only: bool = False, live: bool | int = False,
+           progress: Progress | None = None, **options: Unpack[RenderOptions]) -> RenderResult:
     """Renders a scene, or a scene file, as `covary render` does, to the same bits.
 
     spp: samples per pixel over all passes; by default the scene's, or no limit with `until` or `time`.
@@ -202,6 +204,8 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     crop: x, y, width and height in the frame.
     split: ratio of the samples of the CRN and the independent pass.
     films_only: render the passes only; result.image is then the mean of all samples.
+    live: shows the image, its error and the time left in the notebook, or in the browser at an address that is
+        printed, with buttons; a number is the page's port. docs/live.md
     progress: called with (done, total) samples, up to 20 times a second.
     {declared}
     Ctrl-C ends the render within a tile; with `output` or `passes` samples are kept, and `resume=True` continues.
@@ -230,7 +234,9 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     properties = {"min_depth": loading["min_depth"], "max_depth": loading["max_depth"], **loading["integrator_options"]}
     of_integrator = {name.replace("_", "-"): {"True": "on", "False": "off"}.get(str(value), str(value))
                      for name, value in properties.items() if value is not None}
-    made = _covary.render(chosen._loaded, values, of_integrator, texts, films_only, progress)
+    with LivePage(live, chosen.path, None if output is None else fspath(output)) as page:
+        made = _covary.render(chosen._loaded, values, of_integrator, texts, films_only, progress, page,
+                              getattr(progress, "step", None))
     made["bad_samples"] = [_bad_sample(chosen, bad) for bad in made["bad_samples"]]
     report_bad_samples(made)
     return RenderResult(**made)

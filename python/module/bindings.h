@@ -29,6 +29,8 @@ void bind_images(nb::module_& module);
 void bind_film(nb::module_& module);
 /// Scene and render().
 void bind_render(nb::module_& module);
+/// Pages of renders that run.
+void bind_live(nb::module_& module);
 /// Suites of experiments, and running the program.
 void bind_experiment(nb::module_& module);
 

@@ -66,6 +66,7 @@ NB_MODULE(_covary, module) {
   bind_images(module);
   bind_film(module);
   bind_combine(module);
+  bind_live(module);
   bind_render(module);
   bind_experiment(module);
 }

@@ -15,6 +15,7 @@
 #include "plans/render_settings.h"
 #include "python/module/arrays.h"
 #include "python/module/bindings.h"
+#include "python/module/live.h"
 #include "python/module/work.h"
 #include "risk/predicted_error.h"
 #include "settings/option_names.h"
@@ -128,8 +129,15 @@ nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std:
   return d;
 }
 
+/// What the caller sees of a render that runs.
+struct Watching {
+  nb::object progress;  ///< function of done and total, or None
+  Page* page = nullptr;
+  nb::object step;  ///< of Steps
+};
+
 nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Options& of_integrator,
-                      nb::object progress) {
+                      const Watching& watching) {
   const RenderSettings settings = settings_from<RenderSettings>(choice.values);
   const Plan plan = plan_of(settings, choice);
   RenderRequest request = request_of(settings, scene);
@@ -139,18 +147,30 @@ nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Opti
   std::vector<std::string> warnings(scene.warnings);
   std::mutex mutex;
   RenderResult result;
+  Steps steps(watching.step);
+  const auto progress = [&](uint64_t done, uint64_t total) {
+    steps.deliver();
+    if (!watching.progress.is_none()) watching.progress(done, total);
+  };
   run_work(
       [&](WorkState& state) {
         RenderCallbacks callbacks;
+        steps.watch(callbacks);
         callbacks.stop = &state.stop;
         callbacks.progress = [&](uint64_t done, uint64_t total) { state.done = done, state.total = total; };
         callbacks.warning = [&](const std::string& text) {
           const std::lock_guard lock(mutex);
           warnings.push_back(as_arguments(text));
         };
-        result = render(scene, plan, request, callbacks);
+        if (!watching.page) {
+          result = render(scene, plan, request, callbacks);
+          return;
+        }
+        watching.page->stop = &state.stop;
+        result = watching.page->live.render(scene, plan, request, callbacks);
+        watching.page->stop = nullptr;
       },
-      progress);
+      nb::cpp_function(progress));
   Options given = choice.values;
   given.insert(of_integrator.begin(), of_integrator.end());
   if (const std::string text = missing_network(settings.denoising); !text.empty() && !choice.films_only)
@@ -226,12 +246,14 @@ void bind_render(nb::module_& module) {
   module.def(
       "render",
       [](const std::shared_ptr<LoadedScene>& scene, const Options& values, const Options& of_integrator,
-         const Options& of_estimator, bool films_only, nb::object progress) {
-        return render_scene(*scene, {values, of_estimator, films_only}, of_integrator, progress);
+         const Options& of_estimator, bool films_only, nb::object progress, Page* page, nb::object step) {
+        return render_scene(*scene, {values, of_estimator, films_only}, of_integrator, {progress, page, step});
       },
-      "scene"_a, "values"_a, "of_integrator"_a, "of_estimator"_a, "films_only"_a, "progress"_a.none(),
+      "scene"_a, "values"_a, "of_integrator"_a, "of_estimator"_a, "films_only"_a, "progress"_a.none(), "page"_a.none(),
+      "step"_a.none(),
       nb::sig("def render(scene: LoadedScene, values: dict[str, str], of_integrator: dict[str, str], "
-              "of_estimator: dict[str, str], films_only: bool, progress: typing.Any) "
+              "of_estimator: dict[str, str], films_only: bool, progress: typing.Any, page: Page | None, "
+              "step: typing.Any) "
               "-> dict[str, typing.Any]"));
   module.def("image_of_films", &image_of_films, "values"_a, "of_estimator"_a, "films"_a, "aovs"_a,
              nb::sig("def image_of_films(values: dict[str, str], of_estimator: dict[str, str], films: dict[str, Film], "

@@ -57,7 +57,7 @@ RENDER = {"scene": (*NO_SCENE, ""), "spp": without_none(NO_SPP), "estimator": ("
           "exposure": ("bright", [1]), "sampling": ("common", *NO_TEXT), "sampler": ("halton", *NO_TEXT),
           "groups": (0, -1, 1025, 2.5, "12"),
           "split": (1, "1:1", "half", (1,), (1, 0), (1, -1), ("1", 1)), "films_only": NO_FLAG, "save_training": NO_PATH,
-          "load_training": NO_PATH, "progress": NO_FUNCTION}
+          "load_training": NO_PATH, "live": (0, 70000, 1.5, "yes", None), "progress": NO_FUNCTION}
 #: By function and argument. What a value is refused for may also be found by the library.
 BAD = {
     "covary.Scene.load": {
@@ -67,6 +67,7 @@ BAD = {
         "background": ("x", (1, 2), (0, -1, 0)), "camera": (0, [1]), "ignore_unknown": NO_FLAG},
     "covary.Scene.with_integrator": {"integrator": ("pth", None, *NO_TEXT)},
     "covary.render": RENDER,
+    "covary.render_progressively": {"scene": (*NO_SCENE, ""), "spp": without_none(NO_SPP), "estimator": NO_TEXT},
     "covary.set_threads": {"n": (-1, 5000, 1.5, *NO_NUMBERS)},
     "covary.combine": COMBINE,
     "covary.check_inputs": {"crn": NO_GROUPS, "independent": NO_GROUPS},
@@ -116,7 +117,8 @@ BAD = {
     "covary.blender.changes": {"scene": (3, None)},
 }
 #: Classes that results are made of, which nobody calls, errors, and functions without arguments of ours.
-NOT_CALLED = ("Error", "Warning", "Result", "Report", "BadSample", "Scene", "Film", "View", "Experiment", "Samples")
+NOT_CALLED = ("Error", "Warning", "Result", "Report", "BadSample", "Scene", "Film", "View", "Experiment", "Samples",
+              "Step")
 WITHOUT_ARGUMENTS = ("program", "names", "tqdm")
 
 
@@ -168,6 +170,7 @@ class Arguments(PackageTest):
         of_pair = {"crn": self.crn, "independent": self.independent}
         of_metric = {"image": image, "reference": image}
         given = {"covary.Scene.load": {"path": ROOM}, "covary.render": {"scene": self.scene, "spp": 8},
+                 "covary.render_progressively": {"scene": self.scene, "spp": 8},
                  "covary.combine": of_pair, "covary.check_inputs": of_pair, "covary.read_image": {"path": exr},
                  "covary.write_image": {"path": exr, "image": image}, "covary.read_groups": {"paths": [exr]},
                  "covary.denoise": {"image": image}, "covary.film_from_groups": {"groups": self.crn, "samples": 24},
@@ -259,8 +262,8 @@ class Arguments(PackageTest):
         """All that the library declares, under their names; these differ."""
         declared = {option["name"].replace("-", "_") for option in covary._covary.render_options()}
         other = {"rfilter": "filter", "no_preview": "preview"}
-        taken = set(inspect.signature(covary.render).parameters) - {"scene", "options", "films_only", "progress",
-                                                                    "until_p95", "until_relative"}
+        taken = set(inspect.signature(covary.render).parameters) - {"scene", "options", "films_only", "live",
+                                                                    "progress", "until_p95", "until_relative"}
         of_scene = {"resolution", "environment", "background", "camera"}
         self.assertEqual({other.get(name, name) for name in declared} - of_scene, taken)
         self.assertLessEqual(of_scene, set(inspect.signature(covary.Scene.load).parameters))
