@@ -343,14 +343,9 @@ class Loader {
     result_.spp = sensor.sampler.sample_count;
     result_.sampler_type = sensor.sampler.type;
     result_.camera_to_world = sensor.to_world;
-    if (sensor.shutter_close > sensor.shutter_open && (sensor.to_world || !parts_.movements.empty())) {
-      const std::string blur = fmt::format(
-          "the shutter is open from {} to {}, and there is an <animation>: motion is not blurred; shutter_close must "
-          "be "
-          "shutter_open, the time of the image",
-          sensor.shutter_open, sensor.shutter_close);
-      options_.ignore_unknown ? diagnostics_.warn(sensor_->where, blur) : diagnostics_.error(sensor_->where, blur);
-    }
+    if (sensor.shutter_close > sensor.shutter_open && (sensor.to_world || !parts_.movements.empty()))
+      options_.ignore_unknown ? diagnostics_.warn(sensor_->where, told_of_blur(sensor))
+                              : diagnostics_.error(sensor_->where, told_of_blur(sensor));
     try {
       result_.camera = std::make_shared<Camera>(sensor.camera, film.width, film.height);
       parts_.camera = result_.camera;

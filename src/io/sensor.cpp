@@ -132,6 +132,13 @@ std::shared_ptr<SensorSettings> make_sensor(Parameters& p) {
   return sensor;
 }
 
+std::string told_of_blur(const SensorSettings& sensor) {
+  return fmt::format(
+      "the shutter is open from {} to {}, and there is an <animation>: motion is not blurred; shutter_close must be "
+      "shutter_open, the time of the image",
+      sensor.shutter_open, sensor.shutter_close);
+}
+
 float aspect_of(const SensorSettings* sensor, int width, int height) {
   if (width <= 0) width = sensor ? sensor->film.width : 16;
   if (height <= 0) height = sensor ? sensor->film.height : 9;

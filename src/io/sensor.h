@@ -34,6 +34,8 @@ struct SensorSettings : SceneObject {
   SamplerSettings sampler;
 };
 
+/// That motion is not blurred, for a sensor whose shutter is open for a while.
+std::string told_of_blur(const SensorSettings& sensor);
 /// Width over height of a sensor's film, of which either may be overridden by a number > 0; null: 16:9.
 float aspect_of(const SensorSettings* sensor, int width, int height);
 
