@@ -14,7 +14,9 @@
 namespace covary {
 namespace {
 
-constexpr double kTerminalSeconds = 0.2, kLogSeconds = 10;  // between two drawings
+constexpr double kTerminalSeconds = 0.2;               // between two drawings
+constexpr double kLogSeconds = 10, kLogGrowth = 1.35;  // until the first line of a log, and from one to the next
+constexpr double kUnknown = 1e9;                       // seconds, until a time limit says more
 constexpr int kUsualColumns = 80, kBarColumns = 30;
 
 int terminal_columns() {
@@ -50,14 +52,30 @@ ProgressLine::ProgressLine(std::string label, bool quiet)
 
 ProgressLine::~ProgressLine() { finish(); }
 
-void ProgressLine::begin(const std::string& phase) {
+void ProgressLine::begin(const std::string& phase, uint64_t done) {
   const std::lock_guard lock(mutex_);
   phase_ = phase, shown_.clear();
-  first_ = done_, total_ = 0;
+  first_ = done_ = done, total_ = 0;
+  expected_ = later_units_ = later_seconds_ = 0;
   of_phase_ = Stopwatch();
-  if (!terminal_ || quiet_) return;
-  draw();
+  if (quiet_) return;
+  if (terminal_) draw();
   if (!redrawing_.joinable()) redrawing_ = std::thread([this] { redraw_regularly(); });
+}
+
+void ProgressLine::expect(double seconds) {
+  const std::lock_guard lock(mutex_);
+  expected_ = seconds;
+}
+
+void ProgressLine::later(double units, double seconds) {
+  const std::lock_guard lock(mutex_);
+  later_units_ = units, later_seconds_ = seconds;
+}
+
+void ProgressLine::repeats(int times, double seconds) {
+  const std::lock_guard lock(mutex_);
+  repeats_ = times, repeat_seconds_ = seconds;
 }
 
 void ProgressLine::update(uint64_t done, uint64_t total) {
@@ -75,15 +93,24 @@ void ProgressLine::limit(double seconds) {
   of_limit_ = Stopwatch();
 }
 
-void ProgressLine::toward(const PredictedError& reached, double goal) {
+void ProgressLine::aim(double goal) {
   const std::lock_guard lock(mutex_);
-  note_ = fmt::format("  relMSE {:.2g} ({})", reached.relmse,
-                      reached.bounds ? fmt::format("{:.2g} to {:.2g}", reached.bounds->low, reached.bounds->high)
-                      : reached.doubt.empty() ? "predicted"
-                                              : "unreliable");
-  if (!(goal > 0)) return;
-  note_ += fmt::format(", goal {:.2g}", goal);
-  least_total_ = static_cast<uint64_t>(static_cast<double>(done_) * std::max(1.0, reached.relmse / goal));
+  goal_ = goal;
+}
+
+void ProgressLine::toward(const PredictedError& reached) {
+  const std::lock_guard lock(mutex_);
+  reached_ = fmt::format("{:.2g} ({})", reached.relmse,
+                         reached.bounds ? fmt::format("{:.2g} to {:.2g}", reached.bounds->low, reached.bounds->high)
+                         : reached.doubt.empty() ? "predicted"
+                                                 : "unreliable");
+  if (goal_ > 0)
+    least_total_ = static_cast<uint64_t>(static_cast<double>(done_) * std::max(1.0, reached.relmse / goal_));
+}
+
+std::string ProgressLine::note() const {
+  if (reached_.empty()) return goal_ > 0 ? fmt::format("  goal relMSE {:.2g}", goal_) : "";
+  return fmt::format("  relMSE {}{}", reached_, goal_ > 0 ? fmt::format(", goal {:.2g}", goal_) : "");
 }
 
 void ProgressLine::show(const std::string& text) {
@@ -92,20 +119,24 @@ void ProgressLine::show(const std::string& text) {
   if (terminal_ || !drawn_ || of_line_.seconds() >= next_) draw();
 }
 
+double ProgressLine::all_left(double seconds) const {
+  double left = seconds + later_seconds_;
+  if (seconds_limit_ > 0) left = std::min(left, std::max(0.0, seconds_limit_ - of_limit_.seconds()));
+  return left + repeats_ * (repeat_seconds_ > 0 ? repeat_seconds_ : of_line_.seconds() + left);
+}
+
 std::string ProgressLine::bar_text(int columns) const {
   const uint64_t total = std::max(total_, least_total_);
   const double rate = static_cast<double>(done_ - first_) / std::max(of_phase_.seconds(), 1e-9);
-  double fraction = total ? static_cast<double>(done_) / static_cast<double>(total) : 0;
-  double left = rate > 0 ? static_cast<double>(total - std::min(done_, total)) / rate : 0;
-  if (const double in_time = seconds_limit_ - of_limit_.seconds(); seconds_limit_ > 0 && (in_time < left || !total)) {
-    fraction = std::min(1.0, 1 - in_time / seconds_limit_);
-    left = in_time;
-  }
-  fraction = std::clamp(fraction, 0.0, 1.0);
-  // With an error, 80 columns leave no room for the rate.
-  const std::string speed = note_.empty() ? fmt::format("{} samples/s  ", format_count(rate)) : "";
-  const std::string end = fmt::format(" {:3.0f} %  {}{} left{}", 100 * fraction, speed, format_duration(left), note_);
+  const double limit_used = seconds_limit_ > 0 ? of_limit_.seconds() / seconds_limit_ : 0;
+  const double done = total ? static_cast<double>(done_) / static_cast<double>(total) : 0;
+  const double fraction = std::clamp(std::max(done, limit_used), 0.0, 1.0);
+  const double left = total ? static_cast<double>(total - std::min(done_, total)) / rate : kUnknown;
+  const std::string percent = fmt::format("{:.0f} %", 100 * fraction);
+  const std::string until = format_duration(all_left(left + later_units_ / rate)) + " left" + note();
   const std::string start = fmt::format("{}: {} ", label_, phase_);
+  if (!terminal_) return fmt::format("{}{}, {}", start, percent, until);
+  const std::string end = fmt::format(" {:>5}  {}", percent, until);
   const int room = columns - static_cast<int>(start.size() + end.size()) - 2, width = std::min(room, kBarColumns);
   if (width < 4) return start + end;
   const auto filled = static_cast<size_t>(fraction * width);
@@ -116,13 +147,16 @@ std::string ProgressLine::text(int columns) const {
   if (!shown_.empty()) return shown_;
   if (done_ > first_ && (total_ > 0 || seconds_limit_ > 0)) return bar_text(columns);
   const double seconds = of_phase_.seconds();
-  return fmt::format("{}: {}{}{}", label_, phase_, seconds >= 1 ? " " + format_duration(std::floor(seconds)) : "",
-                     note_);
+  std::string text = fmt::format("{}: {}", label_, phase_);
+  if (seconds >= 1) text += " " + format_duration(std::floor(seconds));
+  if (expected_ > seconds) text += fmt::format("  {} left", format_duration(all_left(expected_ - seconds)));
+  return text + note();
 }
 
 void ProgressLine::draw() {
   if (quiet_ || finished_) return;
-  next_ = of_line_.seconds() + (terminal_ ? kTerminalSeconds : kLogSeconds);
+  const double now = of_line_.seconds();
+  next_ = terminal_ ? now + kTerminalSeconds : std::max(now + kLogSeconds, now * kLogGrowth);
   const int columns = terminal_ ? terminal_columns() - 1 : 1000;  // the last column would wrap the line
   const std::string line = cut_to(text(terminal_ ? columns : kUsualColumns + kBarColumns), columns);
   std::fprintf(stderr, terminal_ ? "\r%s\033[K" : "%s\n", line.c_str());

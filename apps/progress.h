@@ -12,9 +12,9 @@
 
 namespace covary {
 
-/// A line on stderr showing a command's progress, rate and remaining time. On a terminal it is redrawn a few times a
-/// second, no wider than the terminal; otherwise a new line with a bar is printed every ten seconds, so that logs stay
-/// short. All functions are thread-safe.
+/// A line on stderr showing a command's phase and the time left over all of its phases. On a terminal it is redrawn a
+/// few times a second, no wider than the terminal. Otherwise a new line is printed after ten seconds, and then at
+/// growing intervals, about twenty in an hour, so that logs stay short. All functions are thread-safe.
 class ProgressLine {
  public:
   ProgressLine(std::string label, bool quiet);
@@ -23,15 +23,24 @@ class ProgressLine {
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
 
-  /// Starts a phase, such as "loading", shown with its seconds until update() reports progress.
-  void begin(const std::string& phase);
+  /// Starts a phase, such as "loading", shown with its seconds until update() reports progress. `done`: where update()
+  /// counts on from.
+  void begin(const std::string& phase, uint64_t done = 0);
+  /// What begin() was told. Of the phase: the seconds that it will take, if update() does not tell. After it: work that
+  /// takes as long as so many units of update(), and seconds.
+  void expect(double seconds);
+  void later(double units, double seconds);
+  /// All of it follows again so many times, as the frames of a sequence: of `seconds` each, or 0 if unknown.
+  void repeats(int times, double seconds);
   /// Samples of the phase. `total` == 0: unknown.
   void update(uint64_t done, uint64_t total);
   /// A time limit, from now on, that ends the work unless `total` is reached first.
   void limit(double seconds);
-  /// The error so far, shown with its bounds. With a `goal` > 0, the total is at least the estimated number of samples
-  /// for it, as errors fall like 1 / samples.
-  void toward(const PredictedError& reached, double goal);
+  /// The relMSE that ends the work; shown.
+  void aim(double goal);
+  /// The error so far, shown with its bounds. With a goal, the total is at least the estimated number of samples for
+  /// it, as errors fall like 1 / samples.
+  void toward(const PredictedError& reached);
   /// Shows this text instead.
   void show(const std::string& text);
   /// Clears the line (terminal) before other output.
@@ -42,6 +51,9 @@ class ProgressLine {
  private:
   std::string text(int columns) const;
   std::string bar_text(int columns) const;
+  /// Over this and all later phases, if the phase needs `seconds` more.
+  double all_left(double seconds) const;
+  std::string note() const;
   void draw();
   void erase();
   void redraw_regularly();
@@ -49,15 +61,18 @@ class ProgressLine {
   const std::string label_;
   const bool quiet_, terminal_;
   std::mutex mutex_;  // of all below
-  std::string phase_, shown_, note_;
+  std::string phase_, shown_, reached_;
   uint64_t done_ = 0, total_ = 0, least_total_ = 0;
   uint64_t first_ = 0;  // done_ when the phase began
   bool drawn_ = false, finished_ = false;
   Stopwatch of_line_, of_phase_, of_limit_;
-  double seconds_limit_ = 0;
+  double seconds_limit_ = 0, goal_ = 0;
+  double expected_ = 0, later_units_ = 0, later_seconds_ = 0;
+  int repeats_ = 0;
+  double repeat_seconds_ = 0;
   double next_;  // when to draw, seconds of the line
   std::condition_variable end_;
-  std::thread redrawing_;  // on a terminal: shows the seconds of phases without progress
+  std::thread redrawing_;  // shows the seconds of phases without progress
 };
 
 /// 75 -> "1:15", 4000 -> "1:06:40".

@@ -26,6 +26,7 @@
 #include "plans/result_files.h"
 #include "progress.h"
 #include "render_options.h"
+#include "render_progress.h"
 #include "render_steps.h"
 #include "settings/option_names.h"
 #include "stages.h"
@@ -58,32 +59,17 @@ void print_replay(const RenderOptions& options, const LoadedScene& scene) {
   }
 }
 
-const char* name_of(RenderStage stage, const RenderOptions& options) {
-  switch (stage) {
-    case RenderStage::kTraining:
-      return "training";
-    case RenderStage::kRendering:
-      return "rendering";
-    case RenderStage::kEstimating:
-      return options.settings.denoising.denoises() ? "estimating and denoising" : "estimating";
-    case RenderStage::kWriting:
-      return "writing";
-  }
-  throw Error(ErrorCode::kInternal, "unknown stage of a render");
-}
-
 }  // namespace
 
 RenderResult render_watched(const RenderOptions& options, const LoadedScene& scene, const RenderRequest& request,
                             Display* display, ProgressLine& progress, const StopFlag& stop, LiveRender* live) {
   Stopwatch since_preview;
+  RenderProgress shown(options, scene, request, progress);
   RenderCallbacks callbacks;
   callbacks.stop = stop.token();
-  callbacks.stage = [&](RenderStage stage) { progress.begin(name_of(stage, options)); };
-  callbacks.progress = [&](uint64_t done, uint64_t total) {
-    progress.update(done, options.request().seconds > 0 && !options.request().spp ? 0 : total);
-  };
-  callbacks.predicted = [&](const PredictedError& error) { progress.toward(error, options.request().until); };
+  callbacks.stage = [&](RenderStage stage) { shown.begin(stage); };
+  callbacks.progress = [&](uint64_t done, uint64_t total) { shown.update(done, total); };
+  callbacks.predicted = [&](const PredictedError& error) { shown.predicted(error); };
   callbacks.wave = [&](std::span<const Pass> passes) {
     if (!display || !display->ready() || since_preview.seconds() < kPreviewSeconds) return;
     display->update(preview_of(passes));
@@ -93,7 +79,6 @@ RenderResult render_watched(const RenderOptions& options, const LoadedScene& sce
     progress.clear();
     fmt::print(stderr, "warning: {}\n", as_flags(text));
   };
-  progress.limit(options.request().seconds);
   const Plan plan = make_plan(options);
   RenderResult result =
       live ? live->render(scene, plan, request, callbacks) : covary::render(scene, plan, request, callbacks);
@@ -130,7 +115,7 @@ std::string interruption(const RenderOptions& options, const RenderResult& resul
 
 }  // namespace
 
-void report(const RenderReport& report, const StopFlag& stop) {
+void report(const RenderReport& report, const StopFlag& stop, const std::string& frame) {
   const auto& [options, scene, result, load_seconds, threads] = report;
   for (const Pass& pass : result.passes) report_bad_samples(options, pass);
   if (!options.json.empty()) write_text_output(options.json, json_text(statistics(report)));
@@ -138,7 +123,7 @@ void report(const RenderReport& report, const StopFlag& stop) {
   if (result.preview_stops != 0 && options.request().exposure == kAutomaticExposure)
     fmt::print(stderr, "note: '{}' is exposed by {:+g} stops, or much of it would be burnt or black (--exposure)\n",
                preview_path(options.request().output), result.preview_stops);
-  if (!options.quiet) print_summary(report);
+  if (!options.quiet) frame.empty() ? print_summary(report) : print_frame(report, frame);
   const std::string until = options.values.contains("until") ? options.values.at("until") : "of the live page";
   const std::string doubt = result.predicted ? result.predicted->doubt : "";
   if (!doubt.empty() && result.until_reached.value_or(false))
@@ -194,6 +179,9 @@ std::unique_ptr<Display> display_of(const RenderOptions& options) {
 
 void warn_of_scene(const RenderOptions& options, const LoadedScene& scene) {
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));
+  if (const std::string text = advice(options.settings, estimator_of(options), scene);
+      !text.empty() && !options.is_replay() && !options.quiet)
+    fmt::print(stderr, "note: {}\n", as_flags(text));
   const auto given = [&](const char* option) { return options.values.contains(option); };
   if (given("sampling") && !given("estimator") && !given("denoise") && !options.is_replay() && !options.quiet)
     fmt::print(stderr, "note: --sampling renders a single pass without --denoise\n");

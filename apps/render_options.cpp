@@ -16,6 +16,7 @@
 #include "numbers.h"
 #include "passes/light_pass.h"
 #include "plans/integrator_choice.h"
+#include "plans/made_of.h"
 #include "render_steps.h"
 #include "stages.h"
 #include "value_names.h"
@@ -97,7 +98,10 @@ Plan make_plan(const RenderOptions& options) { return render_plan(options.settin
 RenderRequest make_request(const RenderOptions& options, const LoadedScene& scene) {
   RenderRequest request = request_of(options.settings, scene);
   if (options.replay.empty() && request.load_training.empty()) take_training(scene, request);
-  request.attributes = {{film_key::kVersion, COVARY_VERSION}, {film_key::kCommand, command_line()}};
+  request.attributes = {
+      {film_key::kVersion, COVARY_VERSION},
+      {film_key::kCommand, command_line()},
+      {film_key::kMadeOf, made_of(scene.content_hash, {options.values, options.of_integrator, options.of_estimator})}};
   return request;
 }
 
@@ -139,8 +143,8 @@ void add_output_options(CLI::App& command, RenderOptions& o) {
   command.option_defaults()->group(kBasicOptions);
 }
 
-/// The file of that name or, if there is none, the small built-in scene of that name in the program's installation or
-/// source tree.
+}  // namespace
+
 std::string scene_file(const std::string& word) {
   const fs::path beside = fs::path(program_path()).parent_path();
   if (!fs::exists(word) && fs::path(word).filename() == word)
@@ -149,8 +153,6 @@ std::string scene_file(const std::string& word) {
         return file.lexically_normal().string();
   return word;
 }
-
-}  // namespace
 
 std::string program_path() { return fs::read_symlink("/proc/self/exe").string(); }
 
@@ -163,6 +165,7 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   add_threads_option(command, o.threads);
   add_value(command, "--json", o.json, kFileValue, "Statistics; '-': to standard output");
   command.add_flag("--quiet", o.quiet, "No progress and no summary");
+  command.add_flag("--verbose", o.verbose, "In the summary, also speeds and the predicted error with its interval");
   add_output_options(command, o);
   add_options(command, options_of<SequenceSettings>(), o.of_sequence);
   add_options(command, options_of_integrators(), o.of_integrator);

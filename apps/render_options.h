@@ -22,7 +22,7 @@ struct RenderOptions {
   SceneOptions scene_options;
   LiveOptions live;
   int threads = 0;
-  bool quiet = false;
+  bool quiet = false, verbose = false;
 
   const RenderRequest& request() const { return settings.request; }
   /// One sample or light path is printed instead of rendering.
@@ -32,6 +32,10 @@ struct RenderOptions {
 
 /// The file of this program.
 std::string program_path();
+
+/// The file of that name or, if there is none, the small built-in scene of that name in the program's installation or
+/// source tree.
+std::string scene_file(const std::string& word);
 
 void add_render_options(CLI::App& command, RenderOptions& options);
 

@@ -13,10 +13,10 @@
 #include "json_output.h"
 #include "passes/light_pass.h"
 #include "passes/training.h"
+#include "phase_times.h"
 #include "plans/budget.h"
 #include "plans/integrator_trial.h"
 #include "plans/memory.h"
-#include "progress.h"
 #include "risk_report.h"
 #include "settings/option_names.h"
 
@@ -78,15 +78,6 @@ nlohmann::ordered_json statistics_of(const Pass& pass) {
   json["rays"] = pass.result.n_rays;
   json["seconds"] = pass.result.seconds;
   return json;
-}
-
-nlohmann::ordered_json seconds_of(const RenderReport& report) {
-  const RenderResult& result = report.result;
-  return {{"load", report.load_seconds},       {"build", report.scene.scene->build_seconds()},
-          {"train", result.seconds.train},     {"surrogate", result.seconds.surrogate},
-          {"solve", result.seconds.solve},     {"trial", result.seconds.trial},
-          {"render", result.render_seconds()}, {"estimate", result.estimate_seconds()},
-          {"write", result.seconds.write}};
 }
 
 /// What only applies to some renders.
@@ -151,7 +142,7 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
       {"complete", result.complete},
       {"interrupted", result.interrupted},
       {"passes", passes},
-      {"seconds", seconds_of(report)},
+      {"seconds", json_of(phase_times(report), result, load_seconds)},
       {"samples", samples},
       {"rays", rays},
       {"samples_per_second", samples * rate},
@@ -165,46 +156,6 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
       {"bad_samples", bad}};
   add_results(report, estimator, json);
   return json;
-}
-
-void print_summary(const RenderReport& report) {
-  const auto& [options, scene, result, load_seconds, threads] = report;
-  std::string samples;
-  for (const Pass& pass : camera_passes(result.passes))
-    samples += fmt::format("{}{:g} {}", samples.empty() ? "" : " + ", pass.film.mean_count(), pass.plan.name);
-  samples += " samples per pixel";
-  if (const Pass* light = light_pass(result.passes))
-    samples += fmt::format(" + {} light paths", format_count(static_cast<double>(light_paths(light->film))));
-  const double seconds = std::max(result.render_seconds(), 1e-9);
-  fmt::print(stderr, "{}: {} x {}, {} in {:.2f} s (load {:.2f} s, build {:.2f} s, {} samples/s, {} rays/s)\n",
-             options.request().output, result.passes[0].film.width(), result.passes[0].film.height(), samples, seconds,
-             load_seconds, scene.scene->build_seconds(),
-             format_count(result.camera_sum([](const Pass& p) { return p.result.n_samples; }) / seconds),
-             format_count(result.sum([](const Pass& p) { return p.result.n_rays; }) / seconds));
-  if (!result.trials.empty())
-    fmt::print(stderr, "integrator {} (variance x rays)\n", text_of(result.chosen, result.trials));
-  const IntegratorReport of = result.integrator->report();
-  if (!of.summary.empty()) fmt::print(stderr, "{} in {:.2f} s\n", of.summary, result.seconds.train);
-  for (const std::string& warning : of.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));
-  const Estimator estimator = estimator_of(options);
-  if (estimator.passes != EstimatorPasses::kAny) {
-    fmt::print(stderr, "{}{} in {:.2f} s", estimator.text,
-               estimator.network.empty() ? "" : " with " + estimator.network, result.estimate_seconds());
-    if (result.predicted && !result.image.risks) fmt::print(stderr, ", {}", prediction_text(*result.predicted, {}));
-    fmt::print(stderr, "\n");
-  } else if (result.predicted) {
-    fmt::print(stderr, "{}\n", prediction_text(*result.predicted, {}));
-  }
-  print_notes(options.settings.denoising, result.image.note);
-  const double limit = options.request().seconds;
-  if (result.of_time)
-    fmt::print(stderr, "--time {:g} sufficed for {:g} samples per pixel; the same image: {}\n", limit,
-               result.samples_per_pixel(), result.of_time->text());
-  if (limit > 0 && result.seconds.limited > 1.1 * limit)
-    fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for {:g} samples per pixel\n", limit,
-               result.seconds.limited, result.samples_per_pixel());
-  if (result.predicted && result.image.risks)
-    fmt::print(stderr, "{}\n", prediction_text(*result.predicted, result.image.risks));
 }
 
 }  // namespace covary

@@ -5,7 +5,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <map>
 #include <span>
@@ -22,6 +21,7 @@
 #include "passes/motion.h"
 #include "plans/budget.h"
 #include "plans/camera_path.h"
+#include "plans/made_of.h"
 #include "plans/pass_files.h"
 #include "sequences/feature_slopes.h"
 #include "sequences/reprojection.h"
@@ -62,23 +62,23 @@ RenderOptions frame_options(const RenderOptions& options, int frame) {
   return one;
 }
 
-/// A hash of everything that the frame's image depends on: scene and camera, previous camera, seed and settings; with a
-/// history, also `earlier`, the hash of the previous frame.
-std::string frame_hash(const RenderOptions& one, const LoadedScene& scene, const Transform& before,
-                       const std::string& earlier) {
+/// Everything that the frame's image depends on: scene and camera, previous camera, seed and settings; with a history,
+/// also `earlier`, the same of the previous frame.
+std::string frame_made_of(const RenderOptions& one, const LoadedScene& scene, const Transform& now,
+                          const Transform& before, const std::string& earlier) {
+  std::string cameras;
+  for (const Transform* camera : {&now, &before})
+    for (const auto& row : camera->matrix()) cameras += fmt::format(" {}", fmt::join(row, " "));
+  OptionValues of_frame = {{"camera", hash_text(hash_bytes(cameras))}};
+  if (one.sequence.history) of_frame["history"] = "after " + hash_text(hash_bytes(earlier));
   OptionValues values = one.values;
-  for (const char* option : {"output", "passes", "resume", "overwrite", "checkpoint", "no-preview", "exposure"})
-    values.erase(option);
-  std::string text = scene.content_hash;
-  if (one.sequence.history) text += " history " + earlier;
-  for (const auto& row : before.matrix()) text += fmt::format(" {}", fmt::join(row, " "));
-  for (const OptionValues& all : std::array{std::as_const(values), one.of_integrator, one.of_estimator})
-    for (const auto& [name, value] : all) text += fmt::format("\n{}={}", name, value);
-  return hash_text(hash_bytes(text));
+  const int frame = one.sequence.frames->first;
+  values["seed"] = std::to_string(one.request().seed - SequenceSettings::seed_offset(frame));  // as in the command
+  return made_of(scene.content_hash, {values, one.of_integrator, one.of_estimator, of_frame});
 }
 
 /// Whether the file is the complete frame. Throws if it is a complete image of something else.
-bool is_complete(const std::string& path, const std::string& hash) {
+bool is_complete(const std::string& path, const std::string& made_of) {
   if (!fs::exists(path)) return false;
   const std::map<std::string, std::string> attributes = inspect_image(path).attributes;
   const auto value = [&](const char* key) {
@@ -86,11 +86,13 @@ bool is_complete(const std::string& path, const std::string& hash) {
     return it == attributes.end() ? std::string() : it->second;
   };
   if (value(film_key::kComplete) == "false") return false;
-  if (value(film_key::kFrame) == hash) return true;
-  throw Error(ErrorCode::kInput,
-              fmt::format("--resume: '{}' is not a frame of this command: its scene, camera, seed or "
-                          "options differ; without --resume it is replaced",
-                          path));
+  const std::string earlier = value(film_key::kMadeOf);
+  if (earlier == made_of) return true;
+  throw Error(
+      ErrorCode::kInput,
+      fmt::format("--resume: '{}' is not a frame of this command ({}); --overwrite instead of --resume replaces "
+                  "it",
+                  path, earlier.empty() ? "no record of its settings" : differences(earlier, made_of)));
 }
 
 constexpr double kGltfRate = 24;  // whose animations are in seconds
@@ -171,6 +173,7 @@ class SequenceRender {
     const StopFlag stop;
     for (size_t i = 0; i < frames_.size(); ++i) render_frame(i, stop);
     if (stop.is_set()) throw Unfinished(stop.exit_code(), "interrupted when the last frame was written");
+    if (!options_.quiet && n_made_ > 0) print_frames(options_, n_made_, times_made_);
     if (!missed_.empty())
       throw Unfinished(kTargetMissed, fmt::format("frames {} did not reach their target", fmt::join(missed_, ", ")));
   }
@@ -203,23 +206,32 @@ class SequenceRender {
     const Transform now = times_.camera(*scene_, frame).value_or(own_camera_);
     const Transform before = times_.camera(*scene_, frame - 1).value_or(follows ? last_camera_ : now);
     times_.place(frame, now, *scene_);
-    const std::string hash = frame_hash(one, *scene_, before, follows ? last_hash_ : "");
-    last_frame_ = frame, last_hash_ = hash, last_camera_ = now;
-    if (request.resume && is_complete(request.output, hash)) {
+    const std::string made_of = frame_made_of(one, *scene_, now, before, follows ? last_made_of_ : "");
+    last_frame_ = frame, last_made_of_ = made_of, last_camera_ = now;
+    if (request.resume && is_complete(request.output, made_of)) {
       if (!options_.quiet) fmt::print(stderr, "{}: complete\n", request.output);
       return;
     }
     trace_motion(before, times_.time(frame - 1), *scene_, request);
-    request.attributes[film_key::kFrame] = hash;
+    request.attributes[film_key::kMadeOf] = made_of;
     MixingHistory& history = one.settings.denoising.history;
     history.keep_samples = options_.sequence.history;
     if (options_.sequence.history && follows)
       history.before = history_of(frame_name(options_.request().output, frame - 1), request);
-    ProgressLine progress(fmt::format("{} frame {}", stem(), frame), options_.quiet);
+    const std::string name = fmt::format("frame {} ({} of {})", frame, index + 1, frames_.size());
+    const Stopwatch of_frame;
+    ProgressLine progress(fmt::format("{} {}", stem(), name), options_.quiet);
+    progress.repeats(static_cast<int>(frames_.size() - index - 1), n_made_ ? seconds_made_ / n_made_ : 0);
     const RenderResult result = render_watched(one, *scene_, request, display_.get(), progress, stop);
     if (!preview_stops_) preview_stops_ = result.preview_stops;  // or the frames would flicker
+    const RenderReport made{one, *scene_, result, load_seconds_, threads_};
+    PhaseTimes times = phase_times(made);
+    if (n_made_ > 0 && !has_many_scenes()) times.loading = 0;
+    times_made_ += times;
+    ++n_made_;
+    seconds_made_ += of_frame.seconds();
     try {
-      report({one, *scene_, result, load_seconds_, threads_}, stop);
+      report(made, stop, name);
     } catch (const Unfinished& unfinished) {
       if (unfinished.exit_code() != kTargetMissed) throw Unfinished(unfinished.exit_code(), interruption(index));
       fmt::print(stderr, "warning: {}\n", unfinished.what());
@@ -242,11 +254,14 @@ class SequenceRender {
   std::optional<LoadedScene> scene_;
   Transform own_camera_;  // of the scene, without the path
   double load_seconds_ = 0;
+  int n_made_ = 0;  // frames, by this call
+  double seconds_made_ = 0;
+  PhaseTimes times_made_;
   std::optional<double> preview_stops_;
   std::vector<int> missed_;
   int last_frame_ = -2;
   Transform last_camera_;
-  std::string last_hash_;
+  std::string last_made_of_;
 };
 
 }  // namespace

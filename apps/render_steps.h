@@ -9,6 +9,7 @@
 #include "film/outputs.h"
 #include "interruption.h"
 #include "live/live_render.h"
+#include "phase_times.h"
 #include "plans/render.h"
 #include "progress.h"
 #include "render_options.h"
@@ -32,8 +33,15 @@ nlohmann::ordered_json statistics(const RenderReport& report);
 /// Prints lines on stderr about samples that were negative or not finite, with the commands that replay them.
 void report_bad_samples(const RenderOptions& options, const Pass& pass);
 
-/// Prints lines on stderr about a finished render.
+PhaseTimes phase_times(const RenderReport& report);
+
+/// Prints lines on stderr about a finished render: what was written, where the time went, how good it is, and what
+/// would help next; with --verbose, also speeds and figures.
 void print_summary(const RenderReport& report);
+/// The same about a frame of a sequence, in one line; `frame`: "frame 12 (3 of 8)".
+void print_frame(const RenderReport& report, const std::string& frame);
+/// The last lines about a sequence.
+void print_frames(const RenderOptions& options, int n_frames, const PhaseTimes& times);
 
 // covary render --frames: a scene to numbered images. The scene is loaded and built once or, if it is a pattern of
 // names, once per frame. Each frame is the image that `render` makes of it alone with the same camera and seed,
@@ -64,7 +72,8 @@ void warn_of_scene(const RenderOptions& options, const LoadedScene& scene);
 RenderResult render_watched(const RenderOptions& options, const LoadedScene& scene, const RenderRequest& request,
                             Display* display, ProgressLine& progress, const StopFlag& stop, LiveRender* live = nullptr);
 
-/// Writes --json and prints the summary. Throws Unfinished for a render that was interrupted or missed its target.
-void report(const RenderReport& report, const StopFlag& stop);
+/// Writes --json and prints the summary; of a `frame`, its line. Throws Unfinished for a render that was interrupted or
+/// missed its target.
+void report(const RenderReport& report, const StopFlag& stop, const std::string& frame = "");
 
 }  // namespace covary

@@ -67,7 +67,8 @@ class Covary:
         statistics = pathlib.Path(out).with_suffix(".json")
         command = [self.program, "render", str(scene), "-o", str(out), "--spp", str(settings.spp), "--seed", str(seed),
                    "--resolution", f"{settings.width}x{settings.height}", "--rfilter", "box",
-                   "--sampling", "independent", "--json", str(statistics), "--quiet", "--no-preview", *self.options]
+                   "--sampling", "independent", "--json", str(statistics), "--quiet", "--no-preview", "--overwrite",
+                   *self.options]
         if settings.max_depth is not None:
             command += ["--max-depth", str(settings.max_depth)]
         if threads > 0:

@@ -31,6 +31,7 @@ def measure(program, scene, corner, sampling, seed, folder):
     out = pathlib.Path(folder) / f"{sampling}.exr"
     renderers.run([program, "render", str(scene), "-o", str(out), "--sampling", sampling, "--groups", str(GROUPS),
                    "--spp", str(GROUPS * SAMPLES_PER_GROUP), "--seed", str(seed), "--rfilter", "box", "--quiet",
+                   "--overwrite",
                    "--resolution", f"{width}x{height}", "--crop", f"{corner[0]},{corner[1]},{WIDTH},{HEIGHT}"])
     names = [f"group{group:02}.{channel}" for group in range(GROUPS) for channel in "RGB"]
     pixels = renderers.read_channels(out, names)

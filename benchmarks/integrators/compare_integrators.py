@@ -34,7 +34,7 @@ def render(options, scene, words, seed, spp, folder):
     out = pathlib.Path(folder) / "image.exr"
     command = [options.covary, "render", str(scene), "-o", str(out), "--resolution", options.resolution, "--spp",
                str(spp), "--seed", str(seed), "--rfilter", "box", "--max-depth", str(options.max_depth), "--estimator",
-               "none", "--no-preview", "--quiet", *words]
+               "none", "--no-preview", "--overwrite", "--quiet", *words]
     subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
     width, height = (int(side) for side in options.resolution.split("x"))
     return {name: numpy.array(values).reshape(height, width) for name, values in read_exr(out.read_bytes()).items()}

@@ -2,6 +2,7 @@
 #include "plans/render.h"
 
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 
 #include <mutex>
 #include <optional>
@@ -12,6 +13,7 @@
 #include "combine/registry.h"
 #include "core/stopwatch.h"
 #include "plans/integrator_choice.h"
+#include "plans/made_of.h"
 #include "plans/render_settings.h"
 #include "python/module/arrays.h"
 #include "python/module/bindings.h"
@@ -129,6 +131,24 @@ nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std:
   return d;
 }
 
+const char* name_of(RenderStage stage, bool denoises) {
+  switch (stage) {
+    case RenderStage::kTrial:
+      return "short trials";
+    case RenderStage::kTraining:
+      return "training";
+    case RenderStage::kAuxiliary:
+      return "auxiliary images";
+    case RenderStage::kRendering:
+      return "samples";
+    case RenderStage::kEstimating:
+      return denoises ? "denoising" : "combining";
+    case RenderStage::kWriting:
+      return "writing";
+  }
+  throw Error(ErrorCode::kInternal, "unknown stage of a render");
+}
+
 /// What the caller sees of a render that runs.
 struct Watching {
   nb::object progress;  ///< function of done and total, or None
@@ -136,32 +156,42 @@ struct Watching {
   nb::object step;  ///< of Steps
 };
 
-nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Options& of_integrator,
+nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Options& of_integrator, int threads,
                       const Watching& watching) {
   const RenderSettings settings = settings_from<RenderSettings>(choice.values);
   const Plan plan = plan_of(settings, choice);
   RenderRequest request = request_of(settings, scene);
   request.films_only = choice.films_only;
   request.attributes[film_key::kVersion] = COVARY_VERSION;
+  request.attributes[film_key::kMadeOf] =
+      made_of(scene.content_hash, {choice.values, of_integrator, choice.of_estimator});
   if (request.load_training.empty()) take_training(scene, request);
   std::vector<std::string> warnings(scene.warnings);
+  if (const std::string text = advice(settings, *plan.estimator, scene); !text.empty() && !choice.films_only)
+    warnings.push_back(as_arguments(text));
   std::mutex mutex;
   RenderResult result;
   Steps steps(watching.step);
-  const auto progress = [&](uint64_t done, uint64_t total) {
+  const auto progress = [&](uint64_t done, uint64_t total, const std::string& phase) {
     steps.deliver();
-    if (!watching.progress.is_none()) watching.progress(done, total);
+    if (!watching.progress.is_none()) watching.progress(done, total, phase);
   };
   run_work(
       [&](WorkState& state) {
         RenderCallbacks callbacks;
         steps.watch(callbacks);
         callbacks.stop = &state.stop;
+        callbacks.stage = [&](RenderStage stage) {
+          state.done = 0, state.total = 0;
+          state.phase = name_of(stage, settings.denoising.denoises());
+        };
         callbacks.progress = [&](uint64_t done, uint64_t total) { state.done = done, state.total = total; };
         callbacks.warning = [&](const std::string& text) {
           const std::lock_guard lock(mutex);
           warnings.push_back(as_arguments(text));
         };
+        std::optional<tbb::global_control> limit;
+        if (threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
         if (!watching.page) {
           result = render(scene, plan, request, callbacks);
           return;
@@ -246,13 +276,13 @@ void bind_render(nb::module_& module) {
   module.def(
       "render",
       [](const std::shared_ptr<LoadedScene>& scene, const Options& values, const Options& of_integrator,
-         const Options& of_estimator, bool films_only, nb::object progress, Page* page, nb::object step) {
-        return render_scene(*scene, {values, of_estimator, films_only}, of_integrator, {progress, page, step});
+         const Options& of_estimator, bool films_only, int threads, nb::object progress, Page* page, nb::object step) {
+        return render_scene(*scene, {values, of_estimator, films_only}, of_integrator, threads, {progress, page, step});
       },
-      "scene"_a, "values"_a, "of_integrator"_a, "of_estimator"_a, "films_only"_a, "progress"_a.none(), "page"_a.none(),
-      "step"_a.none(),
+      "scene"_a, "values"_a, "of_integrator"_a, "of_estimator"_a, "films_only"_a, "threads"_a, "progress"_a.none(),
+      "page"_a.none(), "step"_a.none(),
       nb::sig("def render(scene: LoadedScene, values: dict[str, str], of_integrator: dict[str, str], "
-              "of_estimator: dict[str, str], films_only: bool, progress: typing.Any, page: Page | None, "
+              "of_estimator: dict[str, str], films_only: bool, threads: int, progress: typing.Any, page: Page | None, "
               "step: typing.Any) "
               "-> dict[str, typing.Any]"));
   module.def("image_of_films", &image_of_films, "values"_a, "of_estimator"_a, "films"_a, "aovs"_a,

@@ -101,20 +101,26 @@ void check_not_forked() {
                 "by multiprocessing.get_context('spawn'), or use covary in them only");
 }
 
-/// Calls `progress` if the numbers have changed.
+/// Calls `progress` if the numbers or the phase have changed.
 class Reporter {
  public:
   explicit Reporter(nb::handle progress) : progress_(progress) {}
   void report(const WorkState& state) {
     const uint64_t done = state.done, total = state.total;
-    if (progress_.is_none() || total == 0 || (done == done_ && total == total_)) return;
-    done_ = done, total_ = total;
-    progress_(done, total);
+    const char* phase = state.phase;
+    if (progress_.is_none() || (total == 0 && !phase)) return;
+    if (done == done_ && total == total_ && phase == phase_) return;
+    done_ = done, total_ = total, phase_ = phase;
+    if (phase)
+      progress_(done, total, phase);
+    else
+      progress_(done, total);
   }
 
  private:
   nb::handle progress_;
   uint64_t done_ = 0, total_ = 0;
+  const char* phase_ = nullptr;
 };
 
 }  // namespace

@@ -161,6 +161,8 @@ void render_aovs(const Scene& scene, const PassSettings& pass, uint32_t most, Fi
   std::array<Image, kImages> images;
   for (Image& image : images) image = Image(film.width(), film.height(), 3);
   const auto stopped = [&] { return stop && stop->load(std::memory_order_relaxed); };
+  std::atomic<uint64_t> n_done = 0;
+  const auto width = static_cast<uint64_t>(film.width()), n_pixels = width * static_cast<uint64_t>(film.height());
   parallel_for(film.height(), [&](int y) {
     if (stopped()) return;
     Round round(scene, settings);
@@ -169,6 +171,7 @@ void render_aovs(const Scene& scene, const PassSettings& pass, uint32_t most, Fi
       for (size_t i = 0; i < kImages; ++i)
         for (int c = 0; c < 3; ++c) images[i].pixel(x, y)[c] = means[i][c];
     }
+    if (pass.progress) pass.progress(n_done += width, n_pixels);
   });
   if (stopped()) return;
   for (size_t i = 0; i < kImages; ++i) film.aovs[kAuxiliaryImages[i]] = std::move(images[i]);

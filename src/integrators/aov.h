@@ -30,8 +30,8 @@ inline constexpr int kFollowedBounces = 8;
 ///
 /// At a mirror or glass surface, one direction is sampled as for a path, at most kFollowedBounces times; a ray that is
 /// still between mirrors then takes the last of them. Rays that leave the scene count as zero. The random numbers are
-/// points of a Sobol' sequence with the pass's key, as good as four times as many independent ones. If `stop` becomes
-/// true, ends at the next row and leaves film.aovs unchanged.
+/// points of a Sobol' sequence with the pass's key, as good as four times as many independent ones. Tells
+/// PassSettings::progress the pixels done. If `stop` becomes true, ends at the next row and leaves film.aovs unchanged.
 void render_aovs(const Scene& scene, const PassSettings& pass, uint32_t most, Film& film,
                  const std::atomic<bool>* stop = nullptr);
 

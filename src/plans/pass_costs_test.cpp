@@ -20,12 +20,14 @@ std::string with(const std::string& key, const std::string& value) {
 }
 
 TEST(PassCosts, AreReadAsTheyWereWritten) {
-  for (const PassCosts& costs : {PassCosts{18446744073709551615u, 7, 1.25, 0.5}, PassCosts{}, PassCosts{1, 2, 0.1}}) {
+  for (const PassCosts& costs :
+       {PassCosts{18446744073709551615u, 7, 1.25, 0.5, 2.5}, PassCosts{}, PassCosts{1, 2, 0.1}}) {
     const PassCosts read = parse_pass_costs(to_text(costs));
     EXPECT_EQ(read.samples, costs.samples);
     EXPECT_EQ(read.rays, costs.rays);
     EXPECT_EQ(read.seconds, costs.seconds);
     EXPECT_EQ(read.estimate_seconds, costs.estimate_seconds);
+    EXPECT_EQ(read.processor_seconds, costs.processor_seconds);
   }
 }
 

@@ -17,6 +17,7 @@
 #include "film/film_file.h"
 #include "film/output_file.h"
 #include "film/splat_layer.h"
+#include "plans/made_of.h"
 
 namespace covary {
 namespace {
@@ -43,6 +44,7 @@ void read_costs(const std::function<void(const std::string&)>& warn, Pass& pass)
     pass.result = {};
     pass.result.n_samples = costs.samples, pass.result.n_rays = costs.rays;
     pass.result.seconds = costs.seconds, pass.result.estimate_seconds = costs.estimate_seconds;
+    pass.processor_seconds = costs.processor_seconds;
   } catch (const std::exception& problem) {
     if (warn) warn(fmt::format("'{}' is not used, so that times count this run alone: {}", path, problem.what()));
   }
@@ -50,8 +52,9 @@ void read_costs(const std::function<void(const std::string&)>& warn, Pass& pass)
 
 void write_costs(const Pass& pass) {
   const PassResult& result = pass.result;
-  write_text_file(costs_path(pass), to_text({result.n_samples, result.n_rays, result.seconds,
-                                             pass.settings.estimate ? result.estimate_seconds : 0}));
+  write_text_file(costs_path(pass),
+                  to_text({result.n_samples, result.n_rays, result.seconds,
+                           pass.settings.estimate ? result.estimate_seconds : 0, pass.processor_seconds}));
 }
 
 /// Replaces the empty film with the one at pass.path, which it must match.
@@ -153,11 +156,18 @@ void check_earlier_films(const Plan& plan, const RenderRequest& request) {
                                              "replaces it"
                                            : "`resume` continues it, and `overwrite` replaces it"));
   std::error_code ignored;
-  if (is_film || request.resume || !request.passes.empty()) return;
-  for (const fs::directory_entry& entry : fs::directory_iterator(passes_folder(request), ignored))
-    if (entry.path().extension() == ".exr")
-      throw Error(ErrorCode::kInput, fmt::format("'{}' already exists, in the folder for the films of this render; {}",
-                                                 entry.path().string(), kWaysOut));
+  const bool has_folder = !is_film && !request.resume && request.passes.empty();
+  if (has_folder)
+    for (const fs::directory_entry& entry : fs::directory_iterator(passes_folder(request), ignored))
+      if (entry.path().extension() == ".exr")
+        throw Error(ErrorCode::kInput,
+                    fmt::format("'{}' already exists, in the folder for the films of this render; {}",
+                                entry.path().string(), kWaysOut));
+  // Films that are continued are compared themselves; those that would be replaced are refused when they are found.
+  const bool has_films = fs::is_directory(request.passes, ignored) && !fs::is_empty(request.passes, ignored);
+  const auto made_of = request.attributes.find(film_key::kMadeOf);
+  if (!continues && !has_films && made_of != request.attributes.end())
+    check_made_alike(request.output, made_of->second, request.resume);
 }
 
 void take_film_on_disk(const Plan& plan, const RenderRequest& request,
@@ -227,6 +237,7 @@ PassCosts parse_pass_costs(std::string_view text) {
   if (!json.is_object()) fail("expected a JSON object");
   PassCosts costs{amount<uint64_t>(json, "samples"), amount<uint64_t>(json, "rays"), amount<double>(json, "seconds")};
   if (json.contains("estimate_seconds")) costs.estimate_seconds = amount<double>(json, "estimate_seconds");
+  if (json.contains("processor_seconds")) costs.processor_seconds = amount<double>(json, "processor_seconds");
   if (costs.estimate_seconds > costs.seconds) fail("'estimate_seconds' is above 'seconds'");
   return costs;
 }
@@ -234,6 +245,7 @@ PassCosts parse_pass_costs(std::string_view text) {
 std::string to_text(const PassCosts& costs) {
   Json json = {{"samples", costs.samples}, {"rays", costs.rays}, {"seconds", costs.seconds}};
   if (costs.estimate_seconds > 0) json["estimate_seconds"] = costs.estimate_seconds;
+  if (costs.processor_seconds > 0) json["processor_seconds"] = costs.processor_seconds;
   return json.dump(2) + "\n";
 }
 

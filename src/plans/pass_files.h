@@ -19,8 +19,6 @@ namespace film_key {
 inline constexpr const char* kTemporary = "temporary";     ///< "true": removed once the image of the render is written
 inline constexpr const char* kTrial = "integrator_trial";  ///< the choice and its reason (integrator_trial.h)
 inline constexpr const char* kBudgets = "budgets";         ///< of a render to a target error (budget.h): "96 168"
-/// For a frame of a sequence, in film and result: a hash of everything that its image depends on.
-inline constexpr const char* kFrame = "frame";
 /// Of a render with a time limit: TimeChoice::text(), with which it is made again.
 inline constexpr const char* kTimeChoice = "time_choice";
 }  // namespace film_key
@@ -35,7 +33,8 @@ std::filesystem::path passes_folder(const RenderRequest& request);
 std::string pass_path(const Plan& plan, const RenderRequest& request, const PassPlan& pass);
 
 /// Before rendering: throws Error(kInput) if the request neither resumes nor overwrites, but would restart films of an
-/// interrupted render, at its output or in the folder next to it, or would use that folder although it contains films.
+/// interrupted render, at its output or in the folder next to it, or would use that folder although it contains films;
+/// or replace an image that is made of something else, according to film_key::kMadeOf (made_of.h).
 void check_earlier_films(const Plan& plan, const RenderRequest& request);
 
 /// Looks for a film at pass.path. When resuming, it replaces the empty film, which it must match; if a folder keeps
@@ -56,14 +55,15 @@ void remove_passes(const RenderRequest& request, std::span<const Pass> passes);
 
 struct PassCosts {
   uint64_t samples = 0, rays = 0;
-  double seconds = 0;           ///< of rendering
-  double estimate_seconds = 0;  ///< part of `seconds`: fitting; 0 if a pass only renders
+  double seconds = 0;            ///< of rendering
+  double estimate_seconds = 0;   ///< part of `seconds`: fitting; 0 if a pass only renders
+  double processor_seconds = 0;  ///< 0: unknown
 };
 
 /// Throws Error(kInput) if the text is not such a JSON object, or a value is impossible.
 PassCosts parse_pass_costs(std::string_view text);
 
-/// The text that parse_pass_costs() reads; without `estimate_seconds` if that is 0.
+/// The text that parse_pass_costs() reads; without `estimate_seconds` and `processor_seconds` if they are 0.
 std::string to_text(const PassCosts& costs);
 
 }  // namespace covary

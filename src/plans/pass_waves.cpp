@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/processor_time.h"
 #include "film/splat_layer.h"
 #include "passes/light_pass.h"
 #include "passes/pass_limits.h"
@@ -135,7 +136,9 @@ uint64_t render_passes(const Scene& scene, std::span<Pass> passes, const WaveLim
         if (wave.limit == pass.count) return done;
       }
     }
+    const double before = processor_seconds();
     const PassResult result = render_wave(scene, pass, wave, pass.film);
+    pass.processor_seconds += processor_seconds() - before;
     add(result, pass.result);
     done += result.n_samples;
     if (!result.complete) return done;  // interrupted, or out of time

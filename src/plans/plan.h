@@ -59,8 +59,9 @@ struct Pass {
   /// For a light pass: the number of samples that matches the camera's; it may exceed what a film can hold if only a
   /// time limit ends the render.
   double wanted = 0;
-  bool misses_error = false;  ///< the plan needs more samples for its target error than it may take
-  PassResult result;          ///< accumulated over all calls, earlier ones included if a folder keeps the passes
+  bool misses_error = false;     ///< the plan needs more samples for its target error than it may take
+  double processor_seconds = 0;  ///< of its samples, accumulated like `result`
+  PassResult result;             ///< accumulated over all calls, earlier ones included if a folder keeps the passes
 };
 
 /// State available to phases.

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/processor_time.h"
 #include "film/splat_layer.h"
 #include "passes/light_pass.h"
 #include "passes/training.h"
@@ -69,7 +70,9 @@ RenderResult PlanRun::run() {
       estimate();
     }
     const Stopwatch watch;
+    const double before = processor_seconds();
     write_files();
+    result_.seconds.processor -= processor_seconds() - before;
     result_.seconds.write += watch.seconds();
     result_.seconds.limited = watch_.seconds();
   } catch (...) {
@@ -105,6 +108,7 @@ bool PlanRun::render_to_limits() {
   if (!train(scene_, request_, *integrator_, settings, result_.seconds)) return false;
   state_.budget = state_.group_budget = rounds_.budget();
   if (timed()) {
+    begin(RenderStage::kTrial);
     const double before = watch_.seconds();
     plan_time_limit();
     if (stopped()) return false;
@@ -264,6 +268,7 @@ Pass PlanRun::begin_pass(const PassPlan& plan) {
   if (plan.light) pass.film.attributes.insert_or_assign(film_key::kLightPaths, std::to_string(kBundlePaths));
   if (!plan.estimator.empty()) pass.film.attributes.insert_or_assign("estimator", plan.estimator);
   take_film_on_disk(plan_, request_, callbacks_.warning, pass);
+  result_.seconds.processor += pass.processor_seconds;  // of earlier calls
   if (const auto budgets = pass.film.attributes.find(film_key::kBudgets); budgets != pass.film.attributes.end())
     rounds_.take(budgets->second, largest_budget(scene_, request_), pass.path);
   pass.settings.groups = pass.film.groups();

@@ -89,9 +89,12 @@ bool PlanRun::estimate() {
 }
 
 void PlanRun::render_auxiliary_images() {
+  begin(RenderStage::kAuxiliary);
   const Stopwatch watch;
   Pass& last = state_.passes[camera_passes(state_.passes).size() - 1];
-  render_aovs(*scene_.scene, last.settings, aov_samples_, last.film, callbacks_.stop);
+  PassSettings settings = last.settings;
+  settings.progress = callbacks_.progress;
+  render_aovs(*scene_.scene, settings, aov_samples_, last.film, callbacks_.stop);
   result_.aovs = std::exchange(last.film.aovs, {});
   if (callbacks_.auxiliary && !stopped()) callbacks_.auxiliary(result_.aovs);
   result_.seconds.auxiliary = watch.seconds();

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/processor_time.h"
 #include "passes/sample_parts.h"
 #include "plans/budget.h"
 #include "plans/integrator_choice.h"
@@ -72,10 +73,12 @@ Sampler sampler_of(const LoadedScene& scene, const RenderRequest& request) {
 RenderResult render(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
                     const RenderCallbacks& callbacks) {
   check(scene, plan, request);
-  if (callbacks.stage && !integrator_of(scene, request).choices().empty()) callbacks.stage(RenderStage::kTraining);
+  if (callbacks.stage && !integrator_of(scene, request).choices().empty()) callbacks.stage(RenderStage::kTrial);
+  const double before = processor_seconds();
   RequestOfChoice of = request_of_choice(scene, request, callbacks.stop);
   RenderResult result = PlanRun(scene, plan, of.request, callbacks).run();
   result.seconds.trial += of.seconds;
+  result.seconds.processor += processor_seconds() - before;
   if (of.trials.empty()) return result;
   result.trials = std::move(of.trials);
   result.chosen = registered_name(*of.request.integrator);

@@ -20,8 +20,10 @@
 
 namespace covary {
 
-/// Phases of a render's progress. Rendering and estimating may repeat, with RenderRequest::until.
-enum class RenderStage { kTraining, kRendering, kEstimating, kWriting };
+/// Phases of a render's progress: choosing an integrator or, with a time limit, measuring what parts of the render
+/// take; the integrator's training; auxiliary images; samples; the image of their films; files. Rendering and
+/// estimating may repeat, with RenderRequest::until.
+enum class RenderStage { kTrial, kTraining, kAuxiliary, kRendering, kEstimating, kWriting };
 
 /// Callbacks of a render. Any of them may be empty.
 struct RenderCallbacks {
@@ -30,7 +32,8 @@ struct RenderCallbacks {
   std::function<void(RenderStage)> stage;  ///< a phase begins
   /// After each estimate with an error: the predicted error, that of blocks with RenderRequest::until_in_blocks.
   std::function<void(const PredictedError&)> predicted;
-  /// After each tile, from any thread; must be thread-safe. Counts the samples and light paths of the current phase.
+  /// After each tile, from any thread; must be thread-safe. Counts the samples and light paths of the current phase; of
+  /// kAuxiliary, pixels.
   std::function<void(uint64_t done, uint64_t total)> progress;
   /// Between waves, when films may be read; about twice a second in passes of a single wave.
   std::function<void(std::span<const Pass>)> wave;
@@ -60,6 +63,9 @@ struct RenderSeconds {
       0;  ///< choosing an integrator by trial and, with a time limit, measuring what the parts of the render take
   double estimate = 0;  ///< of the final estimate, after the passes
   double write = 0;
+  /// Processor time of everything but reading the scene and writing files; of samples, like the passes, with that of
+  /// earlier calls. Programs that share the machine take the clock's time, but not this.
+  double processor = 0;
   double limited = 0;  ///< time that counts towards the limit, in this call: all of it
 };
 

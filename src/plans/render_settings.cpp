@@ -16,6 +16,9 @@
 namespace covary {
 namespace {
 
+/// Fewer are few (measured: docs/notes/denoising.md).
+constexpr uint32_t kFewSamples = 64;
+
 constexpr int kLargestSide = 65536;
 
 std::string read_resolution(const std::string& text, RenderSettings& v) {
@@ -126,6 +129,23 @@ RenderRequest request_of(const RenderSettings& settings, const LoadedScene& scen
                 fmt::format("`oidn` has no effect {}, and no training with `cv-variance` relative-oidn", kNotDenoised));
   if (is_surrogate) request.oidn = oidn;
   return request;
+}
+
+std::string advice(const RenderSettings& settings, const Estimator& estimator, const LoadedScene& scene) {
+  const RenderRequest& request = settings.request;
+  if (request.seconds > 0 || request.until > 0 || request.films_only) return "";
+  const uint32_t samples = request.spp.value_or(static_cast<uint32_t>(scene.spp));
+  if (samples >= kFewSamples) return "";
+  const std::string& mode = settings.denoising.mode;
+  if (estimator.passes == EstimatorPasses::kIndependent && (mode == "balanced" || mode == "bias"))
+    return fmt::format(
+        "around {} independent samples per pixel, `denoise` {} is nearly the same as auto; for less bias take {} or "
+        "more, or `estimator` iicv with `denoise` {}",
+        samples, mode, kFewSamples, mode);
+  if (estimator.passes != EstimatorPasses::kPair || samples >= estimator.reliable_samples) return "";
+  return fmt::format("with {} samples per pixel, `estimator` {} is {}; take {} or more, or leave `estimator` out",
+                     samples, settings.estimator, mode == DenoisingChoice::kNone ? "blotchy" : "worse than the default",
+                     estimator.reliable_samples);
 }
 
 void take_training(const LoadedScene& scene, RenderRequest& request) {

@@ -37,6 +37,11 @@ Plan render_plan(const RenderSettings& settings, const OptionValues& of_estimato
 /// uses.
 RenderRequest request_of(const RenderSettings& settings, const LoadedScene& scene);
 
+/// What to use instead where options do little for so many samples per pixel: `denoise` balanced or bias around the
+/// mean of few independent samples, a pair of passes with few samples. Empty if there is nothing to say, or the number
+/// is not known.
+std::string advice(const RenderSettings& settings, const Estimator& estimator, const LoadedScene& scene);
+
 /// Subtracts the samples of the integrator's training, if any, from those of the passes, if their number is known.
 /// Throws Error(kUsage) if none are left.
 void take_training(const LoadedScene& scene, RenderRequest& request);

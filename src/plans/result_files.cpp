@@ -13,6 +13,7 @@
 #include "film/image_writer.h"
 #include "integrators/aov.h"
 #include "plans/light_plan.h"
+#include "plans/made_of.h"
 #include "plans/pass_files.h"
 
 namespace covary {
@@ -43,7 +44,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
     const Film& film = last;
     std::map<std::string, std::string> attributes;
     for (const char* key : {film_key::kSeed, film_key::kSceneHash, film_key::kSettings, film_key::kVersion,
-                            film_key::kCommand, film_key::kFrame, film_key::kTimeChoice})
+                            film_key::kCommand, film_key::kMadeOf, film_key::kTimeChoice})
       if (film.attributes.count(key)) attributes[std::string("covary:") + key] = film.attributes.at(key);
     const bool estimated = !result.image.estimate.data.empty();
     attributes["covary:estimator"] = estimated ? plan.estimator->text : kMeanName;

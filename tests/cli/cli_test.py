@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 import resource
 import subprocess
 import tempfile
@@ -39,8 +40,16 @@ class CliTest(unittest.TestCase):
         self.assertNotIn("internal error", result.stderr)
         return result
 
+    def replacing(self, arguments):
+        """The words, with --overwrite if they render into a file that there is, as tests do with other settings."""
+        if arguments[:1] != ("render",) or "-o" not in arguments or {"--resume", "--overwrite"} & set(arguments):
+            return arguments
+        output = arguments[arguments.index("-o") + 1]
+        exists = (self.path / output).exists() or ("#" in output and any(self.path.glob(re.sub("#+", "*", output))))
+        return (*arguments, "--overwrite") if exists else arguments
+
     def good(self, *arguments, **more):
-        result = self.run_covary(*arguments, **more)
+        result = self.run_covary(*self.replacing(arguments), **more)
         self.assertEqual(result.returncode, 0, result.stderr)
         return result
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The line of progress, as a terminal shows it: what is done, how far it is, and nothing that stays."""
+import json
 import os
 import re
 import sys
@@ -29,21 +30,33 @@ class Progress(CliTest):
             at = text.index(part, at) + len(part)
 
     def test_every_phase_is_shown_and_none_stays(self):
-        text = self.shown(*RENDER, "--spp", "8", "-o", "a.exr")
-        self.in_order(text, "room: loading", "room: rendering", "room: estimating", "room: writing", "\r\033[K",
-                      "a.exr: ")
+        text = self.shown(*RENDER, "--spp", "8", "-o", "a.exr", "--oidn", "off")
+        self.in_order(text, "room: loading", "room: auxiliary images", "room: samples", "room: denoising",
+                      "room: writing", "\r\033[K", "a.exr: ")
         self.assertNotIn("training", text)
         self.assertNotIn("room: ", text[text.index("a.exr: "):])
         text = self.shown(*RENDER, "--spp", "8", "--denoise", "balanced", "--integrator", "guided-path",
                           "--guiding-train", "4", "-o", "b.exr")
-        self.in_order(text, "loading", "training", "rendering", "estimating and denoising", "writing")
-        self.good(*RENDER, "--estimator", "iicv", "--spp", "8", "-o", "c.exr", "--passes", "films")
+        self.in_order(text, "loading", "training", "auxiliary images", "samples", "denoising", "writing")
+        text = self.shown(*RENDER, "--estimator", "iicv", "--spp", "8", "-o", "c.exr", "--passes", "films")
+        self.in_order(text, "loading", "samples", "combining", "writing")
         text = self.shown("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "d.exr")
         self.in_order(text, "d: loading", "d: estimating", "d: writing", "d.exr: ")
 
+    def test_the_time_left_is_that_of_all_phases(self):
+        """Also before their numbers are known; of a sequence, of all of its frames, which are named."""
+        text = self.shown(*RENDER[:2], "--resolution", "480x320", "--spp", "16", "--no-preview", "--oidn", "off", "-o",
+                          "a.exr")
+        for phase in ("auxiliary images", "samples"):
+            self.assertRegex(text, rf"room: {phase} (?:\[[ =]+\])? +\d+ %  \d+:\d\d left")
+        text = self.shown(*RENDER, "--spp", "8", "--estimator", "none", "--frames", "2-4", "-o", "f_#.exr")
+        self.in_order(text, "frame 2 (1 of 3): samples", "frame 2 (1 of 3): f_2.exr in ", "frame 4 (3 of 3): samples",
+                      "f_#.exr: 3 frames", "\ntime: ", "\nnext: `covary convert 'f_#.exr' video.mp4` makes a video")
+
     def test_the_error_that_is_reached_is_shown_with_its_bounds(self):
         text = self.shown(*RENDER, "--estimator", "iicv", "--until", "relmse=0.0015", "-o", "a.exr", columns=120)
-        self.in_order(text, "estimating", "rendering  relMSE ", ", goal 0.0015", "estimating", "writing")
+        self.in_order(text, "samples", "  goal relMSE 0.0015", "combining", "samples  relMSE ", ", goal 0.0015",
+                      "combining", "writing")
         known = r"  relMSE ([0-9.e-]+) \((?:([0-9.e-]+) to ([0-9.e-]+)|unreliable)\), goal 0.0015"
         reached = [float(x) for x, _, _ in re.findall(known, text)]
         self.assertGreater(reached[0], 0.0015)
@@ -56,7 +69,7 @@ class Progress(CliTest):
         self.assertRegex(text, r"writing  relMSE [0-9.e-]+ \([^)]+\)(?!, goal)")
 
     def test_the_line_fits_the_terminal(self):
-        text = self.shown(*RENDER, "--spp", "96", "-o", "a.exr", columns=30)
+        text = self.shown(*RENDER, "--spp", "96", "--oidn", "off", "-o", "a.exr", columns=30)
         lines = [line.replace("\033[K", "") for line in text[:text.index("a.exr: ")].split("\r")]
         self.assertGreater(len(lines), 3)
         self.assertLess(max(map(len, lines)), 30, lines)
@@ -64,7 +77,71 @@ class Progress(CliTest):
     def test_silence(self):
         self.assertEqual(self.shown(*RENDER, "--spp", "8", "-o", "a.exr", "--quiet"), "")
         done = self.good(*RENDER, "--spp", "8", "-o", "b.exr")
-        self.assertNotRegex(done.stderr, "\r|loading|rendering|writing")
+        self.assertNotRegex(done.stderr, "\r|room: ")
+
+
+class Summary(CliTest):
+    """The lines at the end."""
+
+    def said(self, *arguments):
+        return self.good(*RENDER[:2], "--resolution", "120x80", "--oidn", "off", *arguments).stderr
+
+    def test_four_lines(self):
+        lines = self.said("--spp", "16", "-o", "a.exr", "--json", "a.json").splitlines()
+        facts = json.loads((self.path / "a.json").read_text())
+        self.assertEqual(lines[-4], "a.exr: 120 x 80 pixels, 16 samples per pixel; a.png to look at")
+        self.assertRegex(lines[-3], r"^time: [\d.]+ s: (loading|auxiliary images) [\d.]+ s, .*samples [\d.]+ s")
+        left = re.match(r"how good: about ([\d.]+) % (?:grain|error) left; `--spp 64` leaves about ([\d.]+) %$",
+                        lines[-2])
+        self.assertTrue(left, lines[-2])
+        percent = 100 * facts["predicted_relmse"] ** 0.5
+        self.assertAlmostEqual(float(left[1]) / percent, 1, delta=0.06)
+        self.assertAlmostEqual(float(left[2]) / percent, 0.5 ** 0.5, delta=0.06)
+        goal = float(re.fullmatch(r"next: `--until relmse=([\de.-]+)` renders until half of it is left", lines[-1])[1])
+        self.assertAlmostEqual(goal / facts["predicted_relmse"], 0.25, delta=0.13)
+        self.assertNotIn("predicted relMSE", "".join(lines))
+        said = self.said("--spp", "16", "-o", "a.exr", "--verbose")
+        self.assertRegex(said, r"(?m)^predicted relMSE .* % of it squared bias; the mean of the samples has ")
+        self.assertRegex(said, r"(?m)^load [\d.]+ s, build [\d.]+ s, render [\d.]+ s \(.* samples/s, .* rays/s\)$")
+
+    def test_the_mean_is_halved_by_four_times_the_samples(self):
+        said = self.good(*RENDER, "--spp", "16", "--estimator", "none", "--groups", "8", "-o", "a.exr").stderr
+        self.assertRegex(said, r"(?m)^how good: about [\d.]+ % grain left( \(unsure.*\))?; `--spp 64` halves it$")
+        self.assertRegex(self.good(*RENDER, "--spp", "16", "--estimator", "none", "-o", "b.exr").stderr,
+                         "(?m)^how good: unknown, as no error is predicted here$")
+
+    def test_the_json_has_every_phase(self):
+        self.said("--spp", "16", "-o", "a.exr", "--json", "a.json")
+        seconds = json.loads((self.path / "a.json").read_text())["seconds"]
+        phases = ("load", "build", "train", "trial", "auxiliary", "samples", "estimate", "write")
+        self.assertAlmostEqual(sum(seconds[phase] for phase in phases), seconds["total"], 6)
+        self.assertAlmostEqual(seconds["auxiliary"] + seconds["samples"], seconds["render"], 6)
+        self.assertTrue(all(seconds[phase] > 0 for phase in ("auxiliary", "samples", "estimate", "write", "processor")))
+
+    def test_options_that_do_little_are_told(self):
+        self.assertIn("note: around 16 independent samples per pixel, --denoise balanced is nearly the same as auto; "
+                      "for less bias take 64 or more, or --estimator iicv with --denoise balanced",
+                      self.said("--spp", "16", "--denoise", "balanced", "-o", "a.exr"))
+        self.assertIn("note: with 16 samples per pixel, --estimator iicv is blotchy; take 48 or more, or leave "
+                      "--estimator out", self.good(*RENDER, "--spp", "16", "--estimator", "iicv", "-o", "b.exr").stderr)
+        self.assertNotIn("note: ", self.said("--spp", "64", "--denoise", "balanced", "-o", "c.exr"))
+
+    def test_images_of_other_settings_are_not_replaced(self):
+        first = (*RENDER, "--spp", "4", "--estimator", "none", "-o", "a.exr")
+        for _ in range(2):  # the same may be made again
+            self.assertEqual(self.run_covary(*first).returncode, 0)
+        self.bad(1, "'a.exr' was rendered with other settings (seed default, now 2; spp 4, now 8); give another "
+                    "name, or --overwrite to replace it", *RENDER, "--spp", "8", "--estimator", "none", "-o", "a.exr",
+                 "--seed", "2")
+        self.assertEqual(self.run_covary(*RENDER, "--spp", "8", "--estimator", "none", "-o", "a.exr",
+                                         "--overwrite").returncode, 0)
+        frames = (*RENDER, "--spp", "4", "--estimator", "none", "--frames", "1-2", "-o", "f_#.exr")
+        for _ in range(2):
+            self.assertEqual(self.run_covary(*frames).returncode, 0)
+        self.bad(1, "'f_1.exr' was rendered with other settings (max-depth default, now 3); ", *frames, "--max-depth",
+                 "3")
+        self.bad(1, "--resume: 'f_1.exr' is not a frame of this command (max-depth default, now 3); --overwrite "
+                    "instead of --resume replaces it", *frames, "--max-depth", "3", "--resume")
 
 
 if __name__ == "__main__":

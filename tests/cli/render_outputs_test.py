@@ -111,7 +111,7 @@ class Until(RenderTest):
     def test_not_reached(self):
         for limit in (("--spp", "48"), ("--time", "0.05")):
             result = self.run_covary("render", ROOM, *SMALL, "-o", "a.exr", *IICV, "--until", "relmse=1e-9", *limit,
-                                     "--json", "-")
+                                     "--json", "-", "--overwrite")
             self.assertEqual(result.returncode, 3, result.stderr)
             self.assertRegex(result.stderr, r"\A(warning: --time 0.05 is too short: .*\n)?"
                          r"covary: --until relmse=1e-9 was not reached: 'a.exr' has a predicted "
@@ -136,9 +136,9 @@ class Until(RenderTest):
     def test_an_unreliable_prediction_at_most_doubles_the_samples(self):
         for scene, resolution, doubt, budgets in (("caustic", "48x36", True, "96 192 384 500"),
                                                   ("wall", "96x64", False, "96 384 500")):
-            result = self.run_covary("render", str(SCENES / f"{scene}.xml"), "--resolution", resolution, "-o", "a.exr",
-                                     "--quiet", "--no-preview", *IICV, "--until", "relmse=1e-9", "--spp", "500",
-                                     "--passes", scene)
+            result = self.run_covary("render", str(SCENES / f"{scene}.xml"), "--resolution", resolution, "-o",
+                                     f"{scene}.exr", "--quiet", "--no-preview", *IICV, "--until", "relmse=1e-9",
+                                     "--spp", "500", "--passes", scene)
             self.assertEqual(result.returncode, 3, result.stderr)
             self.assertEqual("; that is unreliable: " in result.stderr, doubt, result.stderr)
             self.assertIn(f"covary:budgets: {budgets}\n", self.good("info", f"{scene}/crn.exr").stdout)

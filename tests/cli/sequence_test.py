@@ -123,7 +123,7 @@ class Frames(SequenceTest):
             self.assertEqual((self.path / f"f_{n}.exr").stat().st_mtime_ns, times[n])
         self.assertEqual(self.picture("f_2.exr"), [read_exr(whole[2])[c] for c in "RGB"])
         errors = self.render("-o", "f_#.exr", "--resume", "--seed", "9").stderr
-        self.assertIn("'f_1.exr' is not a frame of this command: its scene, camera, seed or options differ", errors)
+        self.assertIn("'f_1.exr' is not a frame of this command (seed 0, now 9); --overwrite instead", errors)
 
     def difference(self, one, other):
         a, b = self.picture(one), self.picture(other)

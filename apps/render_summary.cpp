@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a render tells its user at the end: what was written, where the time went, how good it is, what would help next.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "core/shell_text.h"
+#include "film/splat_layer.h"
+#include "phase_times.h"
+#include "plans/integrator_trial.h"
+#include "plans/result_files.h"
+#include "progress.h"
+#include "render_progress.h"
+#include "render_steps.h"
+#include "risk_report.h"
+#include "settings/option_names.h"
+
+namespace covary {
+namespace {
+
+/// The error of a result falls like samples^-p: of means, of control variates, and of denoised images (measured on ten
+/// scenes from 16 to 64 samples: docs/notes/denoising.md, docs/methods/iicv.md).
+constexpr double kFallOfMeans = 1, kFallOfPairs = 0.75, kFallOfDenoised = 0.5;
+/// Most of the time, and a render for which it matters.
+constexpr double kMostTime = 0.5, kLongSeconds = 5;
+
+double fall_of(const RenderOptions& options) {
+  if (options.settings.denoising.denoises()) return kFallOfDenoised;
+  return estimator_of(options).passes == EstimatorPasses::kPair ? kFallOfPairs : kFallOfMeans;
+}
+
+/// "4", "0.35": two digits.
+std::string percent_text(double relmse) { return fmt::format("{:.2g} %", 100 * std::sqrt(std::max(0.0, relmse))); }
+
+/// ": `--spp 64` halves it", ": about 2.8 % with `--spp 64`"; empty if so many samples are too many.
+std::string more_samples(const RenderReport& report) {
+  const double samples = std::round(report.result.samples_per_pixel()), relmse = report.result.predicted->relmse;
+  if (samples < 1 || 4 * samples > kMostSamples || report.options.request().until > 0) return "";
+  const double factor = std::pow(4, -fall_of(report.options) / 2);
+  if (factor <= 0.5) return fmt::format("; `--spp {:g}` halves it", 4 * samples);
+  return fmt::format("; `--spp {:g}` leaves about {}", 4 * samples, percent_text(relmse * factor * factor));
+}
+
+std::string samples_text(const RenderResult& result) {
+  std::string passes;
+  for (const Pass& pass : camera_passes(result.passes))
+    passes += fmt::format("{}{:g} {}", passes.empty() ? " (" : " + ", pass.film.mean_count(), pass.plan.name);
+  const bool several = camera_passes(result.passes).size() > 1;
+  std::string text = fmt::format("{:.6g} samples per pixel{}", result.samples_per_pixel(), several ? passes + ")" : "");
+  if (const Pass* light = light_pass(result.passes))
+    text += fmt::format(" + {} light paths", format_count(static_cast<double>(light_paths(light->film))));
+  return text;
+}
+
+/// How much of the picture is noise or blur, as a fraction of its brightness: the root of relMSE.
+std::string quality_text(const RenderReport& report) {
+  const RenderResult& result = report.result;
+  if (!result.predicted) return "unknown, as no error is predicted here";
+  const bool blurred = result.image.risks && result.image.risks->bias_share > 0.5;
+  std::string text =
+      fmt::format("about {} {} left", percent_text(result.predicted->relmse), blurred ? "error" : "grain");
+  if (!result.predicted->doubt.empty()) text += " (unsure: `--verbose` says why)";
+  if (result.until_reached.value_or(false)) text += ", as asked by --until";
+  return text + more_samples(report);
+}
+
+/// What to do for a better picture; empty if there is nothing in particular.
+std::string next_text(const RenderReport& report, const PhaseTimes& times) {
+  const RenderOptions& o = report.options;
+  const RenderResult& result = report.result;
+  if (!missing_network(o.settings.denoising).empty() || o.sequence.is_sequence()) return "";  // it is said
+  if (result.of_time)
+    return fmt::format("`{}` instead of --time makes the same image", result.of_time->text());
+  if (times.auxiliary + times.estimate > kMostTime * times.total() && times.total() > kLongSeconds)
+    return "more samples cost little here: most of the time is the same for any number";
+  if (!o.request().passes.empty())
+    return fmt::format("`--resume --spp {:g}` adds to the samples in {}", 4 * std::round(result.samples_per_pixel()),
+                       shell_text({o.request().passes}));
+  if (!result.predicted || !result.predicted->doubt.empty() || o.request().until > 0) return "";
+  return fmt::format("`--until relmse={:.1g}` renders until half of it is left", result.predicted->relmse / 4);
+}
+
+/// Behind --verbose: speeds, integrator, estimator, and the predicted error with its interval.
+void print_details(const RenderReport& report) {
+  const auto& [options, scene, result, load_seconds, threads] = report;
+  const double seconds = std::max(result.render_seconds(), 1e-9);
+  fmt::print(stderr, "load {:.2f} s, build {:.2f} s, render {:.2f} s ({} samples/s, {} rays/s)\n", load_seconds,
+             scene.scene->build_seconds(), result.render_seconds(),
+             format_count(result.camera_sum([](const Pass& p) { return p.result.n_samples; }) / seconds),
+             format_count(result.sum([](const Pass& p) { return p.result.n_rays; }) / seconds));
+  if (!result.trials.empty())
+    fmt::print(stderr, "integrator {} (variance x rays)\n", text_of(result.chosen, result.trials));
+  if (const IntegratorReport of = result.integrator->report(); !of.summary.empty())
+    fmt::print(stderr, "{} in {:.2f} s\n", of.summary, result.seconds.train);
+  const Estimator estimator = estimator_of(options);
+  if (estimator.passes != EstimatorPasses::kAny)
+    fmt::print(stderr, "{}{} in {:.2f} s\n", estimator.text,
+               estimator.network.empty() ? "" : " with " + estimator.network, result.estimate_seconds());
+  if (result.predicted) fmt::print(stderr, "{}\n", prediction_text(*result.predicted, result.image.risks));
+}
+
+void print_warnings(const RenderReport& report) {
+  const RenderResult& result = report.result;
+  for (const std::string& warning : result.integrator->report().warnings)
+    fmt::print(stderr, "warning: {}\n", as_flags(warning));
+  print_notes(report.options.settings.denoising, result.image.note);
+  const double limit = report.options.request().seconds;
+  if (limit > 0 && result.seconds.limited > 1.1 * limit)
+    fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for {:g} samples per pixel\n", limit,
+               result.seconds.limited, result.samples_per_pixel());
+}
+
+}  // namespace
+
+PhaseTimes phase_times(const RenderReport& report) {
+  return phase_times(report.result, report.load_seconds, report.scene.scene->build_seconds());
+}
+
+void print_summary(const RenderReport& report) {
+  const auto& [options, scene, result, load_seconds, threads] = report;
+  const RenderRequest& request = options.request();
+  const PhaseTimes times = phase_times(report);
+  if (options.verbose) print_details(report);
+  print_warnings(report);
+  fmt::print(stderr, "{}: {} x {} pixels, {}{}\n", request.output, result.passes[0].film.width(),
+             result.passes[0].film.height(), samples_text(result),
+             request.preview ? "; " + preview_path(request.output) + " to look at" : "");
+  fmt::print(stderr, "time: {}\nhow good: {}\n", text_of(times, estimate_name(options)), quality_text(report));
+  if (const std::string next = next_text(report, times); !next.empty()) fmt::print(stderr, "next: {}\n", next);
+}
+
+void print_frame(const RenderReport& report, const std::string& frame) {
+  if (report.options.verbose) print_details(report);
+  print_warnings(report);
+  const PhaseTimes times = phase_times(report);
+  fmt::print(stderr, "{}: {} in {}{}\n", frame, report.options.request().output,
+             seconds_text(times.total() - times.loading), report.result.predicted ? "; " + quality_text(report) : "");
+}
+
+void print_frames(const RenderOptions& options, int n_frames, const PhaseTimes& times) {
+  const std::string& output = options.request().output;
+  fmt::print(stderr, "{}: {} frames\ntime: {}\n", output, n_frames, text_of(times, estimate_name(options)));
+  if (n_frames > 1)
+    fmt::print(stderr, "next: `covary convert {} {}` makes a video\n", shell_text({output}), "video.mp4");
+}
+
+}  // namespace covary

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plans/made_of.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+#include <sstream>
+
+#include "core/error.h"
+#include "film/image_file.h"
+
+namespace covary {
+namespace {
+
+constexpr const char* kOfTheFile[] = {"output",     "passes",   "resume",        "overwrite",
+                                      "checkpoint", "exposure", "save-training", "no-preview"};
+constexpr const char* kGoals[] = {"spp", "time", "until", "max-spp"};
+constexpr const char* kScene = "scene";
+
+template <size_t N>
+bool is_among(const char* const (&names)[N], const std::string& name) {
+  return std::find(std::begin(names), std::end(names), name) != std::end(names);
+}
+
+std::map<std::string, std::string> lines_of(const std::string& text) {
+  std::map<std::string, std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) {
+    const size_t at = line.find('=');
+    lines[line.substr(0, at)] = at == std::string::npos ? "" : line.substr(at + 1);
+  }
+  return lines;
+}
+
+}  // namespace
+
+std::string made_of(const std::string& scene_hash, const std::vector<OptionValues>& options) {
+  std::map<std::string, std::string> lines;
+  for (const OptionValues& some : options)
+    for (const auto& [name, value] : some)
+      if (!is_among(kOfTheFile, name)) lines[name] = value;
+  std::string text = fmt::format("{}={}", kScene, scene_hash);
+  for (const auto& [name, value] : lines) {
+    std::string one = value;
+    std::replace(one.begin(), one.end(), '\n', ' ');
+    text += fmt::format("\n{}={}", name, one);
+  }
+  return text;
+}
+
+std::string differences(const std::string& earlier, const std::string& now, bool continues) {
+  const std::map<std::string, std::string> before = lines_of(earlier), after = lines_of(now);
+  std::set<std::string> names;
+  for (const auto* lines : {&before, &after})
+    for (const auto& [name, value] : *lines) names.insert(name);
+  std::string text;
+  const auto value_in = [](const std::map<std::string, std::string>& lines, const std::string& name) {
+    const auto found = lines.find(name);
+    return found == lines.end() ? "default" : found->second.empty() ? "on" : found->second;
+  };
+  for (const std::string& name : names) {
+    const std::string old_value = value_in(before, name), new_value = value_in(after, name);
+    if (old_value == new_value || (continues && is_among(kGoals, name))) continue;
+    text += text.empty() ? "" : "; ";
+    text +=
+        name == kScene ? "another scene, or a changed one" : fmt::format("{} {}, now {}", name, old_value, new_value);
+  }
+  return text;
+}
+
+void check_made_alike(const std::string& path, const std::string& made_of, bool continues) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return;
+  std::map<std::string, std::string> attributes;
+  try {
+    attributes = inspect_image(path, ChecksumPolicy::kIgnore).attributes;
+  } catch (const Error&) {
+    return;  // not an image
+  }
+  const auto found = attributes.find(std::string("covary:") + film_key::kMadeOf);
+  if (found == attributes.end()) return;
+  if (const std::string differ = differences(found->second, made_of, continues); !differ.empty())
+    throw Error(ErrorCode::kInput, fmt::format("{}'{}' was rendered with other settings ({}); give another name, or "
+                                               "`overwrite` to replace it",
+                                               continues ? "`resume`: " : "", path, differ));
+}
+
+}  // namespace covary

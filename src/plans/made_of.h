@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// What an image is made of, as text in its file, so that a render with other settings does not replace it unasked.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "settings/option.h"
+
+namespace covary {
+
+namespace film_key {
+/// made_of() of the render.
+inline constexpr const char* kMadeOf = "made_of";
+}  // namespace film_key
+
+/// A line "name=value" for the scene's hash and each option that changes the image; options that say where it goes, or
+/// whether it continues, are left out.
+std::string made_of(const std::string& scene_hash, const std::vector<OptionValues>& options);
+
+/// What differs between two texts of made_of(): "spp 16, now 64; another scene"; empty if nothing does. `continues`: a
+/// higher or lower limit of samples, time or error is no difference.
+std::string differences(const std::string& earlier, const std::string& now, bool continues = false);
+
+/// Throws Error(kInput) if the file at `path` is an image that covary made with other settings, according to its
+/// attribute; does nothing if there is no file, or one without the attribute.
+void check_made_alike(const std::string& path, const std::string& made_of, bool continues);
+
+}  // namespace covary
