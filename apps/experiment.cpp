@@ -40,7 +40,7 @@ struct ExperimentCommand {
   std::string seeds, part;
   std::vector<uint32_t> spp;
   std::vector<double> seconds;
-  std::vector<std::string> programs;
+  std::vector<std::string> programs, renderers;
   lab::Overrides overrides;
   int threads = 0;
   bool list = false, print = false, keep_passes = false, quiet = false;
@@ -80,13 +80,15 @@ lab::Suite builtin(const std::string& name) {
                                              name, did_you_mean(name, names), fmt::join(names, ", ")));
 }
 
+/// The suite, not yet changed by the command's options.
 lab::Suite load_suite(const ExperimentCommand& command) {
-  const fs::path given(command.suite);
+  const std::string word = scene_file(command.suite);  // `room` is a scene, too
+  const fs::path given(word);
   lab::Suite suite;
   if (given.extension() == ".json") {
     suite = lab::parse_suite(read_file(command.suite), command.suite, check_suite_command);
-  } else if (is_scene_file(command.suite)) {
-    if (!fs::exists(given)) throw Error(ErrorCode::kIo, "cannot open '" + command.suite + "'");
+  } else if (is_scene_file(word)) {
+    if (!fs::exists(given)) throw Error(ErrorCode::kIo, "cannot open '" + word + "'");
     suite = builtin("compare");
     // A scene called scene.xml is named after its folder.
     const fs::path file = fs::absolute(given);
@@ -98,7 +100,6 @@ lab::Suite load_suite(const ExperimentCommand& command) {
   } else {
     suite = builtin(command.suite);
   }
-  lab::apply(command.overrides, suite);
   return suite;
 }
 
@@ -168,27 +169,28 @@ lab::PlanContext plan_context(const lab::Programs& programs) {
           programs};
 }
 
-/// --program NAME=COMMAND.
-lab::Programs programs_of(const std::vector<std::string>& words) {
-  lab::Programs programs;
+/// Adds those of --program or --renderer NAME=COMMAND.
+void add_programs(const std::string& option, const std::vector<std::string>& words, lab::Programs& programs) {
   for (const std::string& word : words) {
     const size_t equals = word.find('=');
     if (equals == std::string::npos || equals == 0 || equals + 1 == word.size())
-      throw Error(ErrorCode::kUsage, "--program '" + word + "': expected NAME=COMMAND, e.g. mine='python3 mine.py'");
+      throw Error(ErrorCode::kUsage,
+                  fmt::format("{} '{}': expected NAME=COMMAND, e.g. mine='python3 mine.py'", option, word));
     if (!programs.emplace(word.substr(0, equals), word.substr(equals + 1)).second)
-      throw Error(ErrorCode::kUsage, "--program '" + word.substr(0, equals) + "' is given twice");
+      throw Error(ErrorCode::kUsage, fmt::format("{} '{}' is given twice", option, word.substr(0, equals)));
   }
-  return programs;
 }
 
-/// A method for each program that none of the suite's refers to: it gets independent samples in groups, and guides.
-void add_methods_of_programs(const lab::Programs& programs, lab::Suite& suite) {
+/// A method for each program that none of the suite's refers to: it gets independent samples in groups, and guides; or
+/// renders itself.
+void add_methods_of_programs(const lab::Programs& programs, bool renders, lab::Suite& suite) {
   for (const auto& [name, command] : programs) {
     const auto refers = [&](const lab::MethodEntry& method) { return method.program == name; };
     if (std::any_of(suite.methods.begin(), suite.methods.end(), refers)) continue;
     lab::MethodEntry method;
     method.name = method.program = name;
-    method.options = {"--estimator", "none", "--groups", "8", "--aovs"};
+    method.renders = renders;
+    if (renders) method.options = {"--estimator", "none", "--groups", "8", "--aovs"};
     suite.methods.push_back(method);
   }
 }
@@ -243,8 +245,8 @@ void check_methods(const lab::Suite& suite, const lab::Programs& programs) {
       problems.push_back(fmt::format("method '{}': {}", method.name, error.what()));
     }
     if (!method.program.empty() && !programs.contains(method.program))
-      problems.push_back(fmt::format("method '{}' is made by a program of your own: give --program {}=COMMAND",
-                                     method.name, method.program));
+      problems.push_back(fmt::format("method '{}' is made by a program of your own: give --{} {}=COMMAND", method.name,
+                                     method.renders ? "program" : "renderer", method.program));
   }
   if (!problems.empty()) throw Error(ErrorCode::kUsage, fmt::format("{}", fmt::join(problems, "\n")));
 }
@@ -293,9 +295,16 @@ void experiment(ExperimentCommand command) {
   for (uint32_t spp : command.spp) command.overrides.budgets.push_back({spp, 0});
   for (double seconds : command.seconds) command.overrides.budgets.push_back({0, seconds});
   const lab::Part part = parse_part(command.part);
-  const lab::Programs programs = programs_of(command.programs);
+  lab::Programs programs, renderers;
+  add_programs("--program", command.programs, programs);
+  add_programs("--renderer", command.renderers, renderers);
   lab::Suite suite = load_suite(command);
-  add_methods_of_programs(programs, suite);
+  add_methods_of_programs(programs, true, suite);
+  add_methods_of_programs(renderers, false, suite);
+  lab::apply(command.overrides, suite);
+  for (const auto& [name, text] : renderers)
+    if (!programs.emplace(name, text).second)
+      throw Error(ErrorCode::kUsage, "--renderer '" + name + "' is the name of a --program, too");
   if (command.print) return write_text_output("-", json_text(lab::to_json(suite)));
   if (command.output.empty()) throw Error(ErrorCode::kUsage, "no folder for the results given; use -o DIR");
   check_methods(suite, programs);
@@ -342,6 +351,10 @@ void add_experiment(CLI::App& app) {
   add_value(*command, "--program", o->programs, "NAME=COMMAND",
             "A method of your own: a command that makes the image $COVARY_OUTPUT of what was rendered, $COVARY_IMAGE "
             "and $COVARY_FILMS")
+      ->allow_extra_args(false);
+  add_value(*command, "--renderer", o->renderers, "NAME=COMMAND",
+            "Another renderer, or images that you have: a command that makes the image $COVARY_OUTPUT of the scene "
+            "$COVARY_SCENE itself")
       ->allow_extra_args(false);
   add_value(*command, "--scenes", o->scenes, kFolderValue, "Folder of the suite's scene files");
   add_value(*command, "--cache", o->cache, kFolderValue,

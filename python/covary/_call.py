@@ -10,5 +10,6 @@ with socket.socket(socket.AF_UNIX) as connection:
     connection.connect(os.environ["COVARY_METHODS"])
     run = {name: value for name, value in os.environ.items() if name.startswith("COVARY_")}
     connection.sendall(json.dumps({"name": sys.argv[1], "run": run}).encode() + b"\n")
-    answer = connection.makefile("rb").read().decode()
-sys.exit(answer or None)
+    answer = json.loads(connection.makefile("rb").read())
+print("processor_seconds", answer.get("processor_seconds", 0))  # of the other process
+sys.exit(answer.get("error"))

@@ -12,6 +12,7 @@ import socketserver
 import sys
 import tempfile
 import threading
+import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -25,6 +26,7 @@ from . import _covary
 from ._arguments import checked, either, function, instance, list_of, mapping_of, optional, path, text
 from ._images import read_image
 from ._program import run_program
+from ._result import AXES, new_axes
 from .errors import Error, InputError, UsageError
 from .film import Film
 
@@ -39,15 +41,18 @@ _SOCKET = "COVARY_METHODS"
 class Samples:
     """What a method of experiment() makes its image of."""
 
-    #: File of the mean of all samples, with the layers that were rendered.
+    #: File of the mean of all samples, with the layers that were rendered; "" for renderers.
     path: str
-    #: Folder with the film of each pass.
+    #: Folder with the film of each pass; "" for renderers.
     films: str
     #: The scene's file, the seed, and the samples per pixel, or seconds, of the budget.
     scene: str
     seed: int
     spp: int | None
     seconds: float | None
+    #: Width and height of the frame, and the part of it to make: x, y, width, height.
+    frame: tuple[int, int] = (0, 0)
+    crop: tuple[int, int, int, int] = (0, 0, 0, 0)
 
     @cached_property
     def image(self) -> FloatArray:
@@ -80,6 +85,39 @@ class Experiment:
         with open(self.folder / "results.csv", encoding="utf-8", newline="") as file:
             return [{key: _number(value) for key, value in row.items()} for row in csv.DictReader(file)]
 
+    @property
+    def table(self) -> list[dict[str, Any]]:
+        """A dictionary for each scene, method and budget, for `pandas.DataFrame(found.table)`: its errors with their
+        95 % intervals, ratios of the baseline's error to its own, and seconds, by the clock and of the processor."""
+        rows = []
+        for cell in self.results["cells"]:
+            (unit, budget), = cell["budget"].items()
+            row = {"scene": cell["scene"], "method": cell["method"], unit: budget,
+                   "samples_per_pixel": cell["samples_per_pixel"]}
+            for name in ("relmse", "flip", "equal_sample", "equal_time", "equal_processor_time"):
+                known = cell[name]
+                row |= {name: known["value"], f"{name}_low": known["low"], f"{name}_high": known["high"]}
+            seconds = cell["seconds"]
+            rows.append({**row, "seconds": seconds["method"]["value"],
+                         "processor_seconds": seconds["processor"]["value"]})
+        return rows
+
+    @checked(axes=AXES)
+    def plot(self, axes: Any = None) -> Any:
+        """Draws relMSE against samples per pixel, a line for each scene and method, into axes of matplotlib, by default
+        new ones, and returns them."""
+        axes = new_axes() if axes is None else axes
+        lines: dict[str, list[tuple[float, float]]] = {}
+        for row in self.table:
+            if row["relmse"] and row["relmse"] > 0:
+                lines.setdefault(f"{row['scene']}, {row['method']}", []).append(
+                    (row["samples_per_pixel"], row["relmse"]))
+        for name, points in lines.items():
+            axes.plot(*zip(*sorted(points), strict=True), marker="o", label=name)
+        axes.set(xscale="log", yscale="log", xlabel="samples per pixel", ylabel="relMSE")
+        axes.legend()
+        return axes
+
     def __repr__(self) -> str:
         return f"<covary.Experiment {str(self.folder)!r}, {len(self.results['cells'])} cells>"
 
@@ -101,22 +139,28 @@ class _Server(socketserver.ThreadingUnixStreamServer):
 
 class _Request(socketserver.StreamRequestHandler):
     def handle(self) -> None:
-        """Answers with nothing once the image is written, or with what went wrong."""
+        """Answers with the processor time once the image is written, or with what went wrong."""
         asked = json.loads(self.rfile.readline())
         server: Any = self.server
+        answer: dict[str, Any] = {}
         try:
             with server.lock:
+                before = time.process_time()
                 _make(server.methods[asked["name"]], asked["run"])
+                answer["processor_seconds"] = time.process_time() - before
         except Exception as error:  # noqa: BLE001  the experiment reports it as the method's failure
-            self.wfile.write(f"{type(error).__name__}: {error}\n{traceback.format_exc()}".encode())
+            answer["error"] = f"{type(error).__name__}: {error}\n{traceback.format_exc()}"
+        self.wfile.write(json.dumps(answer).encode())
 
 
 def _make(method: Callable[[Samples], Any], run: dict[str, str]) -> None:
     import numpy
 
-    samples = Samples(run["COVARY_IMAGE"], run["COVARY_FILMS"], run["COVARY_SCENE"], int(run["COVARY_SEED"]),
-                      int(run["COVARY_SPP"]) if "COVARY_SPP" in run else None,
-                      float(run["COVARY_SECONDS"]) if "COVARY_SECONDS" in run else None)
+    x, y, width, height = (int(number) for number in run["COVARY_CROP"].split(","))
+    samples = Samples(run.get("COVARY_IMAGE", ""), run.get("COVARY_FILMS", ""), run["COVARY_SCENE"],
+                      int(run["COVARY_SEED"]), int(run["COVARY_SPP"]) if "COVARY_SPP" in run else None,
+                      float(run["COVARY_SECONDS"]) if "COVARY_SECONDS" in run else None,
+                      (int(run["COVARY_WIDTH"]), int(run["COVARY_HEIGHT"])), (x, y, width, height))
     image = numpy.ascontiguousarray(method(samples), numpy.float32)
     _covary.write_image(run["COVARY_OUTPUT"], image, {})
 
@@ -156,10 +200,12 @@ _SUITE = "the name of a suite, the file of one or of a scene, or a suite as a di
 
 
 @checked(suite=either(_SUITE, instance(_SUITE, lambda value: isinstance(value, dict)), path), output=path,
-         methods=optional(mapping_of(function, "a mapping from names to functions")), scenes=optional(path),
+         methods=optional(mapping_of(function, "a mapping from names to functions")),
+         renderers=optional(mapping_of(function, "a mapping from names to functions")), scenes=optional(path),
          options=optional(list_of(text, "a list of words of the program")))
 def experiment(suite: str | PathLike[str] | dict[str, Any], output: str | PathLike[str], *,
                methods: Mapping[str, Callable[[Samples], Any]] | None = None,
+               renderers: Mapping[str, Callable[[Samples], Any]] | None = None,
                scenes: str | PathLike[str] | None = None, options: list[str] | None = None) -> Experiment:
     """Compares methods over scenes, budgets and seeds, as `covary experiment` does; methods may be Python functions.
 
@@ -169,13 +215,16 @@ def experiment(suite: str | PathLike[str] | dict[str, Any], output: str | PathLi
         by "program": NAME what it renders for it; functions that none refers to get independent samples in eight
         groups, with auxiliary features. They are called one after the other, in another thread, and what they take
         counts as their time. A function is computed again if its source has changed.
+    renderers: the same for functions that make the image of the scene themselves, or have it: covary renders nothing
+        for them, and their Samples have no image.
     scenes: folder of the suite's scenes; for a dictionary, by default the current folder.
     options: further words of the program, such as ["--quick"] or ["--spp", "16,64"].
 
     Raises InputError if runs failed, with their messages; those that did not are kept.
     """
-    given = methods or {}
-    words = [word for name, method in given.items() for word in ("--program", _program_of(name, method))]
+    given = {**(methods or {}), **(renderers or {})}
+    words = [word for option, some in (("--program", methods), ("--renderer", renderers))
+             for name, method in (some or {}).items() for word in (option, _program_of(name, method))]
     if scenes is not None:
         words += ["--scenes", fspath(scenes)]
     with tempfile.TemporaryDirectory(prefix="covary-suite-") as folder, _served(given):

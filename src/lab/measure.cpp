@@ -127,6 +127,7 @@ std::vector<double> values_of(const Cell& cell, Value&& value) {
 double relmse(const RunResult& run) { return run.relmse; }
 double temporal(const RunResult& run) { return run.temporal; }
 double seconds(const RunResult& run) { return run.record.method_seconds(); }
+double processor(const RunResult& run) { return run.record.processor_seconds; }
 double mean(const std::vector<double>& values) { return mean_estimate(values).value; }
 
 /// Values of the runs of both cells, paired by seed.
@@ -306,6 +307,7 @@ void measure(Cell& cell, const SceneInstance& scene, const SceneReferences& refe
   cell.estimate_seconds = mean_estimate(values_of(cell, [](const RunResult& r) { return r.record.estimate_seconds; }));
   cell.then_seconds = mean_estimate(values_of(cell, [](const RunResult& r) { return r.record.then_seconds; }));
   cell.method_seconds = mean_estimate(values_of(cell, seconds));
+  cell.processor_seconds = mean_estimate(values_of(cell, processor));
   if (budget.seconds > 0) cell.time_ratio = cell.method_seconds.value / budget.seconds;
   cell.samples_per_pixel = mean(values_of(cell, [](const RunResult& r) { return r.record.samples_per_pixel; }));
   for (const RunResult& run : cell.runs)
@@ -323,6 +325,29 @@ void measure(Cell& cell, const SceneInstance& scene, const SceneReferences& refe
   cell.suspicions = suspicions(cell.split, unbiased);
 }
 
+namespace {
+
+/// Clock and processor disagree by more than this about how long a method takes beside the baseline.
+constexpr double kTimesApart = 1.3;
+
+/// What a busy machine, or threads that one method has no use for, do to equal time.
+void warn_of_busy_machine(const Cell& cell, Results& results) {
+  const double apart = cell.clock_ratio / cell.processor_ratio;
+  if (!(std::max(apart, 1 / apart) > kTimesApart)) return;
+  const Suite& suite = results.suite;
+  std::string text = fmt::format(
+      "{}, {}, {}: by the clock it took {:.2g} times the time of {}, but {:.2g} times its processor time: the machine "
+      "was busy with other work, or one of both uses fewer threads",
+      suite.scenes[cell.scene].name, suite.methods[cell.method].name, suite.budgets[cell.budget].label(),
+      cell.clock_ratio, suite.baseline, cell.processor_ratio);
+  if (std::isfinite(cell.equal_processor_time.value))
+    text += fmt::format("; at equal processor time the ratio of errors is {:.3g}, at equal time {:.3g}",
+                        cell.equal_processor_time.value, cell.equal_time.value);
+  results.warnings.push_back(text);
+}
+
+}  // namespace
+
 void compare_cells(Results& results) {
   const Suite& suite = results.suite;
   const size_t baseline = baseline_of(suite);
@@ -339,6 +364,15 @@ void compare_cells(Results& results) {
       cell.worst = worst_regions(cell.frames, base->frames);
     }
     cell.equal_time = ratio(at_equal_time(*base, cell, budget));
+    const bool timed = cell.processor_seconds.value > 0 && base->processor_seconds.value > 0;
+    if (timed && base->method_seconds.value > 0) {
+      cell.clock_ratio = cell.method_seconds.value / base->method_seconds.value;
+      cell.processor_ratio = cell.processor_seconds.value / base->processor_seconds.value;
+    }
+    if (timed && budget.spp > 0)
+      cell.equal_processor_time =
+          ratio(in_pairs(*base, cell, [](const RunResult& r) { return r.relmse * processor(r); }));
+    warn_of_busy_machine(cell, results);
     if (budget.seconds > 0) continue;
     const double taken = cell.samples_per_pixel, taken_by_base = base->samples_per_pixel;
     cell.equal_sample_normalised = std::abs(taken - taken_by_base) > kSameSamples * std::min(taken, taken_by_base);

@@ -186,10 +186,16 @@ std::vector<Run> runs_of_scene(const Suite& suite, size_t index, const SceneInst
         Words own;
         if (!method.program.empty()) {
           run.program = context.programs.at(method.program);
-          run.environment = {"COVARY_SCENE=" + scene.file, fmt::format("COVARY_SEED={}", seed),
+          run.environment = {"COVARY_SCENE=" + scene.file,
+                             fmt::format("COVARY_SEED={}", seed),
                              budget.spp ? fmt::format("COVARY_SPP={}", budget.spp)
-                                        : fmt::format("COVARY_SECONDS={:g}", budget.seconds)};
-          own = {identity_of_program(run.program)};
+                                        : fmt::format("COVARY_SECONDS={:g}", budget.seconds),
+                             fmt::format("COVARY_WIDTH={}", scene.frame_width),
+                             fmt::format("COVARY_HEIGHT={}", scene.frame_height),
+                             fmt::format("COVARY_CROP={},{},{},{}", scene.window.x, scene.window.y, scene.window.width,
+                                         scene.window.height)};
+          own = {identity_of_program(run.program), method.renders ? "" : "renders nothing"};
+          run.renders = method.renders, run.samples = budget.spp;
         }
         run.work = budget.spp * static_cast<double>(scene.n_pixels());
         run.key = key_of("run", context, scene, {run.options, flattened(run.then), own});

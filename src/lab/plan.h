@@ -48,8 +48,10 @@ void place(SceneInstance& scene, int width, int height, int64_t max_pixels);
 struct Run {
   size_t scene = 0, method = 0, budget = 0;  ///< indices into the suite; method and budget are unused for references
   uint64_t seed = 0;
-  std::vector<std::string> options;  ///< of `covary render SCENE`, without outputs
-  std::string program;               ///< shell command that makes the image of what was rendered; or empty
+  std::vector<std::string> options;      ///< of `covary render SCENE`, without outputs
+  std::string program;                   ///< shell command that makes the image of what was rendered; or empty
+  bool renders = true;                   ///< before the program
+  double samples = 0;                    ///< per pixel, of a run that does not render; 0: unknown
   std::vector<std::string> environment;  ///< "NAME=value" for that command: what the run is
   std::vector<std::vector<std::string>> then;
   std::vector<int> frames;  ///< as in SceneInstance

@@ -16,6 +16,7 @@
 #include <functional>
 
 #include "core/error.h"
+#include "core/processor_time.h"
 #include "core/stopwatch.h"
 
 namespace covary::lab {
@@ -133,6 +134,7 @@ ProcessResult run_process(const std::vector<std::string>& command, const std::at
   result.seconds = watch.seconds();
   result.signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
   result.exit_code = result.signal ? 128 + result.signal : WEXITSTATUS(status);
+  result.processor_seconds = processor_seconds(usage);
   result.peak_memory_bytes = static_cast<uint64_t>(usage.ru_maxrss) * 1024;
   if (result.exit_code == 127 && result.errors.empty()) result.errors = "cannot run " + command[0];
   return result;

@@ -12,7 +12,7 @@ namespace covary::lab {
 struct ProcessResult {
   int exit_code = 0;  ///< 128 + signal for a program ended by a signal
   int signal = 0;
-  double seconds = 0;
+  double seconds = 0, processor_seconds = 0;
   uint64_t peak_memory_bytes = 0;
   std::string output;  ///< standard output
   std::string errors;  ///< standard error, the last 64 KiB

@@ -261,6 +261,7 @@ Json time_table(const Results& results, size_t budget) {
                column("render", "Render", "seconds"), column("estimate", "Estimate", "seconds")};
   if (then) columns.push_back(column("then", "Then", "seconds"));
   columns.push_back(column("method_seconds", "Method", "seconds"));
+  columns.push_back(column("processor", "Processor", "seconds"));
   columns.push_back(column("memory", "Peak memory", "bytes"));
   if (results.suite.budgets[budget].seconds > 0) columns.push_back(column("ratio", "Of the budget", "percent"));
   Json rows = cell_rows(results, budget, [](const Cell& cell, Json& row) {
@@ -270,6 +271,7 @@ Json time_table(const Results& results, size_t budget) {
     row["estimate"] = value_of(cell.estimate_seconds);
     row["then"] = value_of(cell.then_seconds);
     row["method_seconds"] = value_of(cell.method_seconds);
+    row["processor"] = value_of(cell.processor_seconds);
     row["memory"] = cell.peak_memory_bytes;
     row["ratio"] = number(cell.time_ratio);
   });

@@ -40,11 +40,15 @@ struct Cell {
   Estimate relmse_trimmed, mae, flip, above5;
   double mae_of_mean = kNone, flip_of_mean = kNone;  ///< of the mean image of all runs
   Estimate load_seconds, render_seconds, estimate_seconds, then_seconds;
-  Estimate method_seconds;  ///< render + estimate + then
+  Estimate method_seconds;     ///< render + estimate + then
+  Estimate processor_seconds;  ///< of the same; 0: unknown
+  /// Time of this method over that of the baseline, by the clock and by the processor; nothing is known without both.
+  double clock_ratio = kNone, processor_ratio = kNone;
   double samples_per_pixel = 0, peak_memory_bytes = 0;
   Estimate efficiency;  ///< 1 / (relMSE x method seconds)
   /// Error of the baseline over the error of this method, at equal samples and at equal time.
   Estimate equal_sample, equal_time;
+  Estimate equal_processor_time;  ///< with budgets in samples
   /// Numbers of samples differ by more than kSameSamples, so equal_sample compares error x samples.
   bool equal_sample_normalised = false;
   /// For time budgets: method seconds / budget.

@@ -8,9 +8,13 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
+#include <utility>
 
 #include "core/error.h"
 #include "core/shell_text.h"
@@ -43,9 +47,24 @@ void add_statistics(const nlohmann::json& stats, size_t n, RunRecord& record) {
   record.load_seconds += seconds.value("load", 0.0) + seconds.value("build", 0.0);
   record.render_seconds += seconds.value("render", 0.0) + seconds.value("trial", 0.0) + seconds.value("train", 0.0);
   record.estimate_seconds += seconds.value("estimate", 0.0);
+  record.processor_seconds += seconds.value("processor", 0.0);
   record.samples_per_pixel +=
       (stats.value("samples_per_pixel", 0.0) + stats.value("training_samples_per_pixel", 0.0)) / static_cast<double>(n);
   record.peak_memory_bytes = std::max(record.peak_memory_bytes, stats.value("peak_memory_bytes", 0.0));
+}
+
+/// The times of a program that says how long its work took elsewhere or earlier, in lines "seconds 1.5" and
+/// "processor_seconds 1.2".
+ProcessResult told_times(ProcessResult process) {
+  std::istringstream lines(process.output);
+  for (std::string line; std::getline(lines, line);)
+    for (const auto& [name, value] :
+         {std::pair{"seconds ", &process.seconds}, {"processor_seconds ", &process.processor_seconds}})
+      if (line.starts_with(name)) {
+        const double told = std::strtod(line.c_str() + std::strlen(name), nullptr);
+        if (std::isfinite(told) && told >= 0) *value = told;
+      }
+  return process;
 }
 
 /// The frame number in the names of a run's files.
@@ -65,7 +84,8 @@ nlohmann::ordered_json seconds_of(const RunRecord& r) {
   return {{"load", r.load_seconds},
           {"render", r.render_seconds},
           {"estimate", r.estimate_seconds},
-          {"then", r.then_seconds}};
+          {"then", r.then_seconds},
+          {"processor", r.processor_seconds}};
 }
 
 Cache::Cache(std::string folder, const std::string& part) : folder_(std::move(folder)) {
@@ -119,25 +139,24 @@ std::optional<RunRecord> Runner::find(const Run& run) const {
   return record;
 }
 
-Runner::Result Runner::execute(const Run& run, const SceneInstance& scene) const {
-  const std::string folder = cache_.path("runs", run.key), number = number_of(run),
-                    image = folder + "/image" + number + ".exr", stats = folder + "/stats" + number + ".json";
-  fs::create_directories(folder);
+/// What a failed command leaves: nothing if it was stopped.
+Runner::Result Runner::failed(const std::string& command, const ProcessResult& process) const {
+  if (stop_ && stop_->load()) return {};
+  const std::string signal = process.signal ? fmt::format("ended by signal {}; ", process.signal) : "";
+  return {std::nullopt, RunFailure{command, process.exit_code, signal + process.errors}};
+}
+
+/// `covary render` of the run into `output`; its record.
+Runner::Result Runner::render(const Run& run, const SceneInstance& scene, const std::string& output) const {
+  const std::string stats = cache_.path("runs", run.key) + "/stats" + number_of(run) + ".json";
   Words render{program_, "render", scene.file};
   render.insert(render.end(), run.options.begin(), run.options.end());
   const std::string typed_command = typed(render);
   if (threads_ > 0) render.insert(render.end(), {"--threads", fmt::format("{}", threads_)});
-  const bool is_last = run.then.empty() && run.program.empty();
-  std::string output = is_last ? image : folder + "/step0" + number + ".exr";
   render.insert(render.end(), {"--quiet", "--no-preview", "--json", stats, "-o", output});
   // Of an interrupted sequence, complete frames are kept instead of films.
   if (run.frames.empty()) render.insert(render.end(), {"--passes", cache_.path("passes", run.passes_key)});
   render.emplace_back(run.timed ? "--overwrite" : "--resume");
-  const auto failed = [&](const std::string& command, const ProcessResult& process) -> Result {
-    if (stop_ && stop_->load()) return {};
-    const std::string signal = process.signal ? fmt::format("ended by signal {}; ", process.signal) : "";
-    return {std::nullopt, RunFailure{command, process.exit_code, signal + process.errors}};
-  };
   const ProcessResult process = run_process(render, stop_);
   // An image that missed its target error is still an image.
   constexpr int kTargetMissed = 3;
@@ -148,21 +167,39 @@ Runner::Result Runner::execute(const Run& run, const SceneInstance& scene) const
     if (!json) return {std::nullopt, RunFailure{typed_command, 0, "the render wrote no statistics"}};
     add_statistics(*json, std::max<size_t>(1, run.frames.size()), record);
   }
-  record.image = image;
   record.command = typed_command;
   record.messages = process.errors;
+  return {record, std::nullopt};
+}
+
+Runner::Result Runner::execute(const Run& run, const SceneInstance& scene) const {
+  const std::string folder = cache_.path("runs", run.key), number = number_of(run),
+                    image = folder + "/image" + number + ".exr";
+  fs::create_directories(folder);
+  const bool is_last = run.then.empty() && run.program.empty();
+  std::string output = !run.renders ? "" : is_last ? image : folder + "/step0" + number + ".exr";
+  RunRecord record;
+  record.samples_per_pixel = run.samples;
+  if (run.renders) {
+    Result rendered = render(run, scene, output);
+    if (!rendered.record) return rendered;
+    record = *rendered.record;
+  }
+  record.image = image;
   const auto add_step = [&](const std::string& typed_step, const ProcessResult& step) {
     record.then_seconds += step.seconds;
+    record.processor_seconds += step.processor_seconds;
     record.peak_memory_bytes = std::max(record.peak_memory_bytes, static_cast<double>(step.peak_memory_bytes));
-    record.command += " && " + typed_step;
+    record.command += (record.command.empty() ? "" : " && ") + typed_step;
     record.messages += step.errors;
-    for (const std::string& file : files_of(run.frames, output)) fs::remove(file);
+    if (!output.empty())
+      for (const std::string& file : files_of(run.frames, output)) fs::remove(file);
   };
   if (!run.program.empty()) {
     const std::string made = run.then.empty() ? image : folder + "/program.exr";
     const ProcessResult own = run_program(run, output, made);
     if (!own.ok()) return failed(run.program, own);
-    add_step(run.program, own);
+    add_step(run.program, told_times(own));
     output = made;
   }
   for (size_t i = 0; i < run.then.size(); ++i) {
@@ -185,9 +222,10 @@ ProcessResult Runner::run_program(const Run& run, const std::string& rendered, c
   std::error_code ignored;
   fs::remove(wanted, ignored);
   std::vector<std::string> environment = run.environment;
-  environment.insert(environment.end(), {"COVARY_IMAGE=" + rendered, "COVARY_OUTPUT=" + wanted,
-                                         "COVARY_FILMS=" + cache_.path("passes", run.passes_key),
-                                         fmt::format("COVARY_THREADS={}", threads_)});
+  environment.insert(environment.end(), {"COVARY_OUTPUT=" + wanted, fmt::format("COVARY_THREADS={}", threads_)});
+  if (run.renders)
+    environment.insert(environment.end(),
+                       {"COVARY_IMAGE=" + rendered, "COVARY_FILMS=" + cache_.path("passes", run.passes_key)});
   ProcessResult result = run_process({"/bin/sh", "-c", run.program}, stop_, environment);
   if (!result.ok() || fs::exists(wanted)) return result;
   result.exit_code = 1;

@@ -29,6 +29,8 @@ struct RunRecord {
   /// load: reading the scene and building the BVH; render: including training and trials; then: commands after the
   /// render. Wall clock.
   double load_seconds = 0, render_seconds = 0, estimate_seconds = 0, then_seconds = 0;
+  /// Processor time of render, estimate and what follows, without loading; 0: unknown.
+  double processor_seconds = 0;
   double samples_per_pixel = 0, peak_memory_bytes = 0;
   std::string messages;  ///< standard error of the run
   /// Time of the method without loading the scene.
@@ -84,6 +86,8 @@ class Runner {
   void remove_passes(const std::string& passes_key) const;
 
  private:
+  Result failed(const std::string& command, const ProcessResult& process) const;
+  Result render(const Run& run, const SceneInstance& scene, const std::string& output) const;
   ProcessResult run_program(const Run& run, const std::string& rendered, const std::string& wanted) const;
 
   const Cache& cache_;

@@ -80,6 +80,7 @@ Json json_of(const SceneEntry& scene) {
 Json json_of(const MethodEntry& method) {
   Json json{{"name", method.name}, {"options", method.options}};
   if (!method.program.empty()) json["program"] = method.program;
+  if (!method.renders) json["renders"] = false;
   if (!method.then.empty()) json["then"] = method.then;
   if (method.unbiased) json["unbiased"] = true;
   if (method.optional) json["optional"] = true;
@@ -115,6 +116,10 @@ std::vector<std::string> validate(const Suite& suite) {
                                      [](const SceneEntry& scene) { return !scene.frames.empty(); });
   for (const MethodEntry& method : suite.methods) {
     check_options("method '" + method.name + "'", method.options, problems);
+    if (!method.renders && method.program.empty())
+      problems.push_back("method '" + method.name + "': 'renders' is false, so it needs a 'program'");
+    if (!method.renders && !method.options.empty())
+      problems.push_back("method '" + method.name + "': 'options' have no effect, as covary does not render for it");
     if (of_frames && !method.program.empty())
       problems.push_back("method '" + method.name + "': a program makes single images, not frames");
   }

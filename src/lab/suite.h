@@ -53,6 +53,8 @@ struct MethodEntry {
   bool optional = false;                       ///< skipped, with a warning, on scenes and machines that lack support
   /// Name of a program of the user's that makes the image of what was rendered (Programs in plan.h); or empty.
   std::string program = "";
+  /// Whether covary renders for it. Otherwise the program makes the image of the scene itself, or has it.
+  bool renders = true;
 };
 
 struct Suite {

@@ -87,7 +87,8 @@ class SuiteReader {
     method.name = reader.required_text("name");
     method.options = reader.texts("options");
     method.program = reader.text("program").value_or("");
-    for (const auto& [name, flag] : {std::pair{"unbiased", &method.unbiased}, {"optional", &method.optional}})
+    for (const auto& [name, flag] :
+         {std::pair{"unbiased", &method.unbiased}, {"optional", &method.optional}, {"renders", &method.renders}})
       if (const Json* value = reader.find(name)) {
         if (value->is_boolean())
           *flag = value->get<bool>();

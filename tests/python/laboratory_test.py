@@ -31,8 +31,40 @@ class Experiments(PackageTest):
         self.assertEqual(seen, [(seed, 16, None, (8, 24, 32, 3), (24, 32, 3)) for seed in (1, 2)])
         self.assertEqual({row["method"] for row in found.rows}, {"pt", "same"})
         self.assertIn("2 cells", repr(found))
+        row = next(row for row in found.table if row["method"] == "same")
+        self.assertEqual((row["scene"], row["spp"]), ("room", 16))
+        self.assertAlmostEqual(row["relmse"], cells["pt"]["relmse"]["value"], 6)
+        self.assertGreater(row["processor_seconds"], 0)
         self.experiment(same=same)
         self.assertEqual(len(seen), 2, "what is in the cache is not asked for again")
+
+    def test_renderers(self):
+        """covary renders nothing for them; they are told what of the scene to make."""
+        def own(samples):
+            told.append((samples.path, samples.frame, samples.crop, samples.spp))
+            return covary.render(covary.Scene.load(samples.scene, resolution=samples.frame), samples.spp, "none",
+                                 seed=samples.seed).image
+
+        told = []
+        found = covary.experiment(SUITE, self.path / "out", renderers={"own": own}, scenes=ROOM.parent)
+        rows = {row["method"]: row for row in found.table}
+        self.assertAlmostEqual(rows["own"]["relmse"], rows["pt"]["relmse"], 6)
+        self.assertEqual(rows["own"]["samples_per_pixel"], 16)
+        self.assertEqual(told, 2 * [("", (32, 24), (0, 0, 32, 24), 16)])
+
+    def test_plot(self):
+        class Axes:
+            lines = []
+            def plot(self, x, y, **style):
+                self.lines.append((x, style["label"]))
+            def set(self, **words):
+                self.words = words
+            def legend(self):
+                pass
+            imshow = None
+
+        axes = self.experiment().plot(Axes())
+        self.assertEqual((axes.lines, axes.words["yscale"]), ([((16.0,), "room, pt")], "log"))
 
     def test_failures(self):
         def wrong(samples):
