@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ._arguments import checked, optional, text
 from ._render import SCENE, SPP, PathOrScene, render
 from ._result import RenderResult
+from .progress import _phases
 
 if TYPE_CHECKING:
     import numpy
@@ -44,17 +45,17 @@ class _Watcher:
     """render()'s `progress`, which also takes steps; the newest replaces one that was not fetched."""
 
     def __init__(self, progress: Any) -> None:
-        self._progress = progress
+        self._progress = _phases(progress)
         self._changed = threading.Condition()
         self._step: Step | None = None
         self._closed = self._ended = False
         self.error: BaseException | None = None
 
-    def __call__(self, done: int, total: int) -> None:
+    def __call__(self, done: int, total: int, phase: str) -> None:
         if self._closed:
             raise _Closed
         if self._progress is not None:
-            self._progress(done, total)
+            self._progress(done, total, phase)
 
     def step(self, *values: Any) -> None:
         """Called by the extension module."""

@@ -15,11 +15,12 @@ from ._arguments import (
     checked, choice, either, empty_or, flag, function, instance, mapping_of, optional, path, real, scalar, several,
     text, whole,
 )
-from ._combine import DENOISE, DenoiseMode, Progress
+from ._combine import DENOISE, DenoiseMode
 from ._options import DEFAULT, declared_rules, option_texts, passes_of, text_options, underscored
 from ._page import LivePage
 from ._result import BadSample, RenderResult, text_of_bad_samples
 from .errors import BadSamplesWarning, UsageError
+from .progress import RenderProgress, _phases
 from .scenes import _file_of
 
 if TYPE_CHECKING:
@@ -128,6 +129,7 @@ SCENE = either("a covary.Scene, as Scene.load() makes it, or the name of its fil
                instance("a covary.Scene", lambda value: isinstance(value, Scene)), path)
 SEED = whole(0, (1 << 64) - 1)
 SPP = whole(1, _covary.most_samples)
+PROGRESS = optional(either("a function, or True", flag, function))
 
 
 def _check_together(estimator: str | None, given: Mapping[str, Any]) -> None:
@@ -176,7 +178,7 @@ _DECLARED = {name: rule for name, rule in declared_rules(_covary.render_options(
          filter=optional(choice(get_args(Filter))),
          split=optional(several("(CRN, independent), two numbers above 0", real(0, above=True), real(0, above=True))),
          films_only=flag, live=either("True, False or a port from 1 to 65535", flag, whole(1, 65535)),
-         progress=optional(function))
+         threads=whole(0, 4096), progress=PROGRESS)
 def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | None = None, *, integrator: str = "",
            until: float | None = None, until_p95: float | None = None, until_relative: float | None = None,
            time: float | None = None, seed: int = 0,
@@ -185,7 +187,7 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
            overwrite: bool = False, checkpoint: float | None = None, preview: bool = False,
            crop: tuple[int, int, int, int] | None = None, filter: Filter | None = None,
            split: tuple[float, float] | None = None, films_only: bool = False, live: bool | int = False,
-           progress: Progress | None = None, **options: Unpack[RenderOptions]) -> RenderResult:
+           threads: int = 0, progress: RenderProgress | None = None, **options: Unpack[RenderOptions]) -> RenderResult:
     """Renders a scene, or a scene file, as `covary render` does, to the same bits.
 
     spp: samples per pixel over all passes; by default the scene's, or no limit with `until` or `time`.
@@ -206,7 +208,9 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     films_only: render the passes only; result.image is then the mean of all samples.
     live: shows the image, its error and the time left in the notebook, or in the browser at an address that is
         printed, with buttons; a number is the page's port. docs/live.md
-    progress: called with (done, total) samples, up to 20 times a second.
+    threads: at most so many processors; 0: all that set_threads() allows.
+    progress: True for a line of text, or a function, called up to 20 times a second with (done, total) samples; one of
+        three arguments also gets the phase, and is called from the beginning (covary.progress).
     {declared}
     Ctrl-C ends the render within a tile; with `output` or `passes` samples are kept, and `resume=True` continues.
     """
@@ -235,8 +239,8 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     of_integrator = {name.replace("_", "-"): {"True": "on", "False": "off"}.get(str(value), str(value))
                      for name, value in properties.items() if value is not None}
     with LivePage(live, chosen.path, None if output is None else fspath(output)) as page:
-        made = _covary.render(chosen._loaded, values, of_integrator, texts, films_only, progress, page,
-                              getattr(progress, "step", None))
+        made = _covary.render(chosen._loaded, values, of_integrator, texts, films_only, threads,
+                              _phases(progress), page, getattr(progress, "step", None))
     made["bad_samples"] = [_bad_sample(chosen, bad) for bad in made["bad_samples"]]
     report_bad_samples(made)
     return RenderResult(**made)

@@ -18,7 +18,16 @@ if TYPE_CHECKING:
     FloatArray = NDArray[numpy.float32]
 
 
-_AXES = optional(instance("matplotlib's Axes", lambda value: hasattr(value, "imshow")))
+AXES = optional(instance("matplotlib's Axes", lambda value: hasattr(value, "imshow")))
+
+
+def new_axes() -> Any:
+    """Of matplotlib."""
+    try:
+        from matplotlib import pyplot  # type: ignore[import-not-found,import-untyped,unused-ignore]
+    except ImportError as error:
+        raise ImportError("plot() needs matplotlib: pip install matplotlib") from error
+    return pyplot.subplots()[1]
 
 
 def relmse_text(value: float | None, bounds: tuple[float, float] | None) -> str:
@@ -67,6 +76,18 @@ class Result:
             attributes["covary:samples"] = f"{self.samples_per_pixel:g}"
         _covary.write_image(fspath(path), self.image, attributes)
 
+    def to_dict(self) -> dict[str, Any]:
+        """What is known of the image, without images: a row for `pandas.DataFrame([result.to_dict(), …])`."""
+        height, width = self.image.shape[:2]
+        facts: dict[str, Any] = {"width": width, "height": height}
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if isinstance(value, (bool, int, float, str)) or value is None:
+                facts[each.name] = value
+        facts.pop("std_error", None), facts.pop("bias", None)
+        low, high = self.predicted_bounds or (None, None)
+        return {**facts, "predicted_low": low, "predicted_high": high}
+
     def __repr__(self) -> str:
         height, width = self.image.shape[:2]
         samples = "" if self.samples_per_pixel is None else f"{self.samples_per_pixel:g} samples per pixel"
@@ -83,19 +104,15 @@ class Result:
         except (Error, OSError, ValueError) as error:  # such as an image without pixels, or a full disk: the cell stays
             return f"<pre>{html.escape(repr(self))}\n{html.escape(str(error))}</pre>"
 
-    @checked(exposure=real(), axes=_AXES)
+    @checked(exposure=real(), axes=AXES)
     def plot(self, exposure: float = 0.0, axes: Any = None) -> Any:
         """Draws the image, 2^exposure times as bright and in sRGB, into axes of matplotlib, by default new ones, and
         returns them."""
         import numpy
 
-        try:
-            from matplotlib import pyplot  # type: ignore[import-not-found,import-untyped,unused-ignore]
-        except ImportError as error:
-            raise ImportError("plot() needs matplotlib: pip install matplotlib") from error
+        axes = new_axes() if axes is None else axes
         linear = numpy.clip(numpy.nan_to_num(self.image * 2.0 ** exposure), 0, 1)
         shown = numpy.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-        axes = pyplot.subplots()[1] if axes is None else axes
         axes.imshow(shown)
         axes.set_axis_off()
         axes.set_title(relmse_text(self.predicted_relmse, self.predicted_bounds) or self.estimator)

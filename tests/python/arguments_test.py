@@ -57,7 +57,8 @@ RENDER = {"scene": (*NO_SCENE, ""), "spp": without_none(NO_SPP), "estimator": ("
           "exposure": ("bright", [1]), "sampling": ("common", *NO_TEXT), "sampler": ("halton", *NO_TEXT),
           "groups": (0, -1, 1025, 2.5, "12"),
           "split": (1, "1:1", "half", (1,), (1, 0), (1, -1), ("1", 1)), "films_only": NO_FLAG, "save_training": NO_PATH,
-          "load_training": NO_PATH, "live": (0, 70000, 1.5, "yes", None), "progress": NO_FUNCTION}
+          "load_training": NO_PATH, "live": (0, 70000, 1.5, "yes", None), "threads": (-1, 5000, 1.5, *NO_NUMBERS),
+          "progress": NO_FUNCTION}
 #: By function and argument. What a value is refused for may also be found by the library.
 BAD = {
     "covary.Scene.load": {
@@ -68,6 +69,14 @@ BAD = {
     "covary.Scene.with_integrator": {"integrator": ("pth", None, *NO_TEXT)},
     "covary.render": RENDER,
     "covary.render_progressively": {"scene": (*NO_SCENE, ""), "spp": without_none(NO_SPP), "estimator": NO_TEXT},
+    "covary.render_frames": {
+        "scene": (*NO_PATH, None), "output": ("a.exr", None, *NO_PATH), "frames": (3, None, range(0), "x", "1-", [1]),
+        **{name: RENDER[name] for name in ("spp", "estimator", "integrator", "until", "time", "seed", "denoise", "oidn",
+                                           "aovs", "aov_samples", "layers", "filter", "exposure", "sampling",
+                                           "sampler", "groups", "save_training", "load_training", "threads",
+                                           "progress")},
+        "resolution": (3, "36x24", (36,), (0, 24)), "camera_path": NO_PATH, "fps": (0, "1", True), "history": NO_FLAG,
+        "resume": NO_FLAG, "overwrite": NO_FLAG, "preview": NO_FLAG},
     "covary.set_threads": {"n": (-1, 5000, 1.5, *NO_NUMBERS)},
     "covary.combine": COMBINE,
     "covary.check_inputs": {"crn": NO_GROUPS, "independent": NO_GROUPS},
@@ -77,9 +86,11 @@ BAD = {
     "covary.denoise": {"image": NO_GROUPS, "albedo": NO_IMAGE, "normal": NO_IMAGE, "library": ("/nowhere", *NO_TEXT)},
     "covary.Result.save": {"path": ("x.webp", "x", None, *NO_PATH)},
     "covary.experiment": {"suite": (3, "quik", ""), "output": (None, *NO_PATH), "methods": (3, {"a": 3}),
+                          "renderers": (3, {"a": 3}),
                           "scenes": NO_PATH, "options": (3, "--quick", [3])},
     "covary.Samples.layer": {"name": ("Albdo", *NO_TEXT)}, "covary.Samples.film": {"name": ("nothing", *NO_TEXT)},
     "covary.Result.plot": {"exposure": ("1", True, float("nan")), "axes": (3, "x")},
+    "covary.Experiment.plot": {"axes": (3, "x")}, "covary.Result.to_dict": {},
     "covary.Film.load": {"path": (None, *NO_PATH)},
     "covary.Film.save": {"path": (None, *NO_PATH)},
     "covary.Film.attributes": {"attributes": (None, *NO_TEXTS)},
@@ -119,7 +130,7 @@ BAD = {
 #: Classes that results are made of, which nobody calls, errors, and functions without arguments of ours.
 NOT_CALLED = ("Error", "Warning", "Result", "Report", "BadSample", "Scene", "Film", "View", "Experiment", "Samples",
               "Step")
-WITHOUT_ARGUMENTS = ("program", "names", "tqdm")
+WITHOUT_ARGUMENTS = ("program", "names", "line", "tqdm")
 
 
 def public_functions():
@@ -134,7 +145,7 @@ def public_functions():
         for name in names:
             if callable(getattr(module, name)) and not name.endswith(NOT_CALLED) and name not in WITHOUT_ARGUMENTS:
                 yield f"{place}.{name}", getattr(module, name)
-    for cls in (covary.Scene, covary.Result, covary.Samples, covary.View, covary.Film):
+    for cls in (covary.Scene, covary.Result, covary.Samples, covary.Experiment, covary.View, covary.Film):
         for name, value in inspect.getmembers(cls, callable):
             if not name.startswith("_"):
                 yield f"covary.{cls.__name__}.{name}", value
@@ -162,7 +173,8 @@ class Arguments(PackageTest):
         self.samples = covary.Samples(exr, str(self.path), str(ROOM), 1, 8, None)
         covary.write_image(exr, image)
         bound = {"covary.Scene.with_integrator": self.scene.with_integrator, "covary.Result.save": self.result.save,
-                 "covary.Result.plot": self.result.plot,
+                 "covary.Result.plot": self.result.plot, "covary.Result.to_dict": self.result.to_dict,
+                 "covary.Experiment.plot": covary.Experiment(self.path, {"cells": []}).plot,
                  "covary.Samples.layer": self.samples.layer, "covary.Samples.film": self.samples.film,
                  "covary.Film.load": covary.Film.load, "covary.Film.save": self.film.save,
                  "covary.Film.attributes": lambda attributes: setattr(self.film, "attributes", attributes),
@@ -175,6 +187,7 @@ class Arguments(PackageTest):
                  "covary.write_image": {"path": exr, "image": image}, "covary.read_groups": {"paths": [exr]},
                  "covary.denoise": {"image": image}, "covary.film_from_groups": {"groups": self.crn, "samples": 24},
                  "covary.view": {"images": image},
+                 "covary.render_frames": {"scene": ROOM, "output": "f_#.exr", "frames": "1"},
                  "covary.experiment": {"suite": "quick", "output": self.path / "out"},
                  "covary.metrics.compute": {"name": "relmse", **of_metric, "reference2": image},
                  "covary.distributed.render": {"client": Client(), "scene": self.scene, "spp": 24},
@@ -262,7 +275,7 @@ class Arguments(PackageTest):
         """All that the library declares, under their names; these differ."""
         declared = {option["name"].replace("-", "_") for option in covary._covary.render_options()}
         other = {"rfilter": "filter", "no_preview": "preview"}
-        taken = set(inspect.signature(covary.render).parameters) - {"scene", "options", "films_only", "live",
+        taken = set(inspect.signature(covary.render).parameters) - {"scene", "options", "films_only", "live", "threads",
                                                                     "progress", "until_p95", "until_relative"}
         of_scene = {"resolution", "environment", "background", "camera"}
         self.assertEqual({other.get(name, name) for name in declared} - of_scene, taken)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import covary
 import numpy
-from common import PROGRAM, ROOM, PackageTest, rgb
+from common import PROGRAM, ROOM, SOURCE, PackageTest, rgb
 
 SIZE, TEXT = (36, 24), "36x24"
 
@@ -140,6 +140,43 @@ class Render(PackageTest):
         covary.render(self.scene(), spp=24, progress=lambda done, total: seen.append((done, total)))
         self.assertEqual(seen[-1][0], seen[-1][1])
 
+    def test_progress_with_phases(self):
+        """A function of three arguments hears of each phase, from the first; others of samples alone."""
+        seen, counted = [], []
+        covary.render(self.scene(), spp=24, oidn="off", progress=lambda done, total, phase: seen.append(phase))
+        phases = list(dict.fromkeys(seen))
+        self.assertEqual([p for p in ("auxiliary images", "samples", "denoising", "writing") if p in phases], phases)
+        self.assertEqual(phases[-1], "writing")
+        covary.render(self.scene(), spp=24, oidn="off", progress=lambda done, total: counted.append(total))
+        self.assertLessEqual(set(counted), {24 * SIZE[0] * SIZE[1]})
+        code = "import covary, sys; covary.render(sys.argv[1], spp=4, progress=True)"
+        run = subprocess.run([sys.executable, "-c", code, ROOM], capture_output=True, text=True, check=True)
+        self.assertEqual(run.stderr.split("\n")[-2], "writing")
+        self.assertIn("samples\n", run.stderr)
+
+    def test_threads(self):
+        self.assert_same_bits(covary.render(self.scene(), spp=8, oidn="off", threads=1).image,
+                              covary.render(self.scene(), spp=8, oidn="off", threads=2).image)
+
+    def test_facts(self):
+        """A row for a table."""
+        facts = covary.render(self.scene(), spp=8, oidn="off").to_dict()
+        self.assertEqual((facts["width"], facts["height"], facts["samples_per_pixel"]), (*SIZE, 8))
+        self.assertLess(facts["predicted_low"] or 0, facts["predicted_relmse"])
+        self.assertTrue(all(value is None or isinstance(value, (bool, int, float, str)) for value in facts.values()))
+
+    def test_advice(self):
+        self.assertEqual(covary.render(self.scene(), 16, "iicv").warnings, [
+            "with 16 samples per pixel, estimator iicv is blotchy; take 48 or more, or leave estimator out"])
+
+    def test_images_of_other_settings_are_not_replaced(self):
+        file = self.path / "a.exr"
+        for _ in range(2):
+            covary.render(self.scene(), 4, "none", output=file)
+        self.assertIn("rendered with other settings (seed 0, now 1; spp 4, now 8); give another name, or",
+                      self.message_of(covary.InputError, covary.render, self.scene(), 8, "none", output=file, seed=1))
+        covary.render(self.scene(), 8, "none", output=file, seed=1, overwrite=True)
+
     def test_errors(self):
         scene = self.scene()
         for words, keywords in (
@@ -169,6 +206,34 @@ OVERFLOW = """<scene version="3.0.0"><default name="strength" value="3e38"/>
 <emitter type="point"><point name="position" x="1" y="0" z="2.9"/><rgb name="intensity" value="$strength"/></emitter>
 <emitter type="point"><point name="position" x="-1" y="0" z="2.9"/><rgb name="intensity" value="$strength"/></emitter>
 </scene>"""
+
+
+class Frames(PackageTest):
+    def test_bits_of_the_program(self):
+        seen = []
+        path = SOURCE / "scenes" / "room-path.json"
+        files = covary.render_frames(ROOM, self.path / "f_##.exr", range(1, 4), spp=4, estimator="none", seed=3,
+                                     resolution=SIZE, camera_path=path,
+                                     progress=lambda done, total: seen.append((done, total)))
+        self.assertEqual(files, [self.path / f"f_0{frame}.exr" for frame in (1, 2, 3)])
+        self.assertEqual(seen[-1], (3, 3))
+        self.run_program("render", ROOM, "-o", "g_##.exr", "--resolution", TEXT, "--no-preview", "--quiet", "--spp", 4,
+                         "--estimator", "none", "--seed", 3, "--camera-path", path, "--frames", "1-3")
+        for frame in (1, 2, 3):
+            self.assert_same_bits(rgb(self.path / f"f_0{frame}.exr"), rgb(self.path / f"g_0{frame}.exr"))
+        again = {"spp": 4, "estimator": "none", "seed": 3, "resolution": SIZE, "camera_path": path}
+        before = files[0].stat().st_mtime_ns
+        covary.render_frames(ROOM, self.path / "f_##.exr", "1-3", resume=True, **again)
+        self.assertEqual(files[0].stat().st_mtime_ns, before, "complete frames stay")
+        self.assertIn("(seed 3, now 4)", self.message_of(
+            covary.Error, covary.render_frames, ROOM, self.path / "f_##.exr", "1-3", **{**again, "seed": 4}))
+
+    def test_scene_of_the_package_and_options(self):
+        files = covary.render_frames("room", self.path / "h_#.exr", "2", 4, resolution=SIZE, aovs=True, groups=2,
+                                     denoise="none", threads=1)
+        self.assertEqual(covary.read_image(files[0], "Albedo").shape, (24, 36, 3))
+        self.assertIn("expected a name with '#'", self.message_of(covary.UsageError, covary.render_frames, "room",
+                                                                  "h.exr", "2"))
 
 
 class BadSamples(PackageTest):
