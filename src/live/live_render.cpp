@@ -113,13 +113,15 @@ RenderCallbacks LiveRender::watching() {
   const RenderCallbacks& inner = of_->inner;
   RenderCallbacks callbacks = inner;
   callbacks.stage = [&](RenderStage stage) {
-    constexpr const char* kNames[] = {"training", "rendering", "estimating", "writing"};
+    constexpr const char* kNames[] = {"short trials", "training", "auxiliary images", "rendering", "estimating",
+                                      "writing"};
+    counts_samples_ = stage == RenderStage::kTraining || stage == RenderStage::kRendering;
     page_.say({{"phase", kNames[static_cast<int>(stage)]}});
     if (inner.stage) inner.stage(stage);
   };
   callbacks.progress = [&](uint64_t done, uint64_t total) {
     if (inner.progress) inner.progress(done, total);
-    progress(done, total);
+    if (counts_samples_) progress(done, total);
     wait_while_paused();
   };
   callbacks.wave = [&](std::span<const Pass> passes) {

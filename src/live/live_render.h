@@ -71,7 +71,7 @@ class LiveRender {
 
   LiveTexts texts_;
   std::function<void()> stop_;
-  std::atomic<bool> whole_image_{false}, paused_{false};
+  std::atomic<bool> whole_image_{false}, paused_{false}, counts_samples_{false};
   std::unique_ptr<Watched> of_;  // during render()
 
   // In the render's thread.
