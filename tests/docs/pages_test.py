@@ -69,7 +69,7 @@ class Page:
             elif block.language == "python":
                 self.python.append(block)
             elif not block.file:
-                self.problems.append(f"{place}: {block.language} without a file's name that a command of the page reads")
+                self.problems.append(f"{place}: {block.language} without the name of a file that the page reads")
         self.run_python()
         self.holder.cleanup()
 
