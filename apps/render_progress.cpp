@@ -14,7 +14,7 @@ namespace {
 /// Processor time of the estimate for a pixel, with a neural network and without (docs/methods/denoising.md).
 constexpr double kSecondsWithNetwork = 12e-6, kSecondsWithFilters = 5e-6;
 /// A pixel of the auxiliary images, 16 to 64 rays, takes about as long as so many samples.
-constexpr double kAuxiliaryInSamples = 6;
+constexpr double kAuxiliaryInSamples = 4;
 constexpr double kUnknownSamples = 1e15;  // a time limit ends them
 
 const char* name_of(RenderStage stage) {

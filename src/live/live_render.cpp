@@ -113,8 +113,8 @@ RenderCallbacks LiveRender::watching() {
   const RenderCallbacks& inner = of_->inner;
   RenderCallbacks callbacks = inner;
   callbacks.stage = [&](RenderStage stage) {
-    constexpr const char* kNames[] = {"short trials", "training", "auxiliary images", "rendering", "estimating",
-                                      "writing"};
+    constexpr const char* kNames[] = {"short trials", "training",   "auxiliary images",
+                                      "rendering",    "estimating", "writing"};
     counts_samples_ = stage == RenderStage::kTraining || stage == RenderStage::kRendering;
     page_.say({{"phase", kNames[static_cast<int>(stage)]}});
     if (inner.stage) inner.stage(stage);
