@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Command lines of README.md and docs/: the program knows every command and option in them, and takes those of code
 blocks as they stand, in a folder without their files."""
+import itertools
 import os
 import re
 import shlex
@@ -36,7 +37,9 @@ def commands_in(lines):
     """The words of each call of the program; lines that end in a backslash are joined."""
     for line in re.sub(r"\\\n\s*", " ", "\n".join(lines)).splitlines():
         if match := re.match(r"(?:build/release/)?covary ([a-z-]+\b.*)", line):
-            yield shlex.split(re.split(r"\s[|>&#]|;", match[1])[0])
+            words = shlex.shlex(match[1], posix=True, punctuation_chars="|>&;")
+            words.whitespace_split, words.commenters = True, ""  # a # within a word is none
+            yield list(itertools.takewhile(lambda word: not re.match("[|>&;]+$|#$|# ", word), words))
 
 
 class Documentation(CliTest):
