@@ -182,17 +182,21 @@ class SequenceRender {
   std::string stem() const { return fs::path(options_.scene).stem().string(); }
   bool has_many_scenes() const { return is_frame_pattern(options_.scene); }
 
+  /// Files with animations of their own are loaded again for each frame: the first time tells of the scene, and says
+  /// where the camera stands if the file has none.
   void load_scene(const RenderOptions& options, std::span<Outputs> outputs) {
+    const bool again = scene_ && scene_->is_animated && !has_many_scenes();
     ProgressLine progress(stem(), options.quiet);
     progress.begin("loading");
     const Stopwatch watch;
     scene_.reset();  // two might not fit in memory
     scene_ = load(options);
     load_seconds_ = watch.seconds() - scene_->scene->build_seconds();
-    own_camera_ = scene_->camera->settings().to_world;
+    const bool is_framed = std::ranges::count(scene_->added, scene_->sensor) > 0;
+    if (!again || !is_framed) own_camera_ = scene_->camera->settings().to_world;
     progress.finish();
     for (Outputs& of_frame : outputs) of_frame.reads(scene_->files);
-    warn_of_scene(options, *scene_);
+    if (!again) warn_of_scene(options, *scene_);
   }
 
   void render_frame(size_t index, const StopFlag& stop) {

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """`covary render --frames`: numbered images along a camera path, each as it would be alone."""
+import base64
 import json
 import os
 import re
 import signal
+import struct
 import subprocess
 import time
 from pathlib import Path
@@ -276,6 +278,45 @@ class Animation(SequenceTest):
         self.write_text("moving.xml", text.replace('<sensor type="perspective">', '<sensor type="perspective">'
                                                    '<float name="shutter_close" value="1"/>'))
         self.assertIn("motion is not blurred", self.frames("--frames", "1-2", "-o", "f_#.exr", good=False).stderr)
+
+
+class GltfAnimation(SequenceTest):
+    """A file whose square moves by itself, to the right by a tenth of its side a second; times are in seconds."""
+
+    def setUp(self):
+        super().setUp()
+        numbers = [-1, -1, 0, 1, -1, 0, -1, 1, 0, 1, 1, 0, 0, 2, 0, 0, 0, 0.4, 0, 0]
+        data = struct.pack("<20f6H", *numbers, 1, 2, 0, 1, 3, 2)
+        parts = ((0, 48, 5126, "VEC3", 4), (48, 8, 5126, "SCALAR", 2), (56, 24, 5126, "VEC3", 2),
+                 (80, 12, 5123, "SCALAR", 6))
+        self.write_text("moving.gltf", json.dumps({
+            "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 3}]}],
+            "animations": [{"channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
+                            "samplers": [{"input": 1, "output": 2}]}],
+            "buffers": [{"byteLength": len(data), "uri": "data:application/octet-stream;base64,"
+                         + base64.b64encode(data).decode()}],
+            "bufferViews": [{"buffer": 0, "byteOffset": at, "byteLength": n} for at, n, *_ in parts],
+            "accessors": [{"bufferView": i, "componentType": component, "type": kind, "count": count}
+                          for i, (_, _, component, kind, count) in enumerate(parts)]}))
+
+    def place(self, name):
+        """Mean column of the square, in pixels, and its width."""
+        depth = self.channels(name)["Depth"]
+        columns = [i % 32 for i, value in enumerate(depth) if 0 < value < 1e6]
+        return sum(columns) / len(columns), max(columns) - min(columns) + 1
+
+    def test_frames_are_times_of_the_file(self):
+        view = ("--environment", "white")
+        result = self.run_covary("render", "moving.gltf", "--no-preview", *SMALL_WORDS, *view, "--frames", "0-48:24",
+                                 "-o", "f_##.exr")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(result.stderr.count("has no camera"), 1, "the camera stays where it was for the first frame")
+        (first, width), (second, _), (third, _) = (self.place(f"f_{n}.exr") for n in ("00", "24", "48"))
+        self.assertAlmostEqual(second - first, 0.1 * width, delta=0.7)
+        self.assertAlmostEqual(third - first, 0.2 * width, delta=0.7)
+        self.good("render", "moving.gltf", *QUIET, *SMALL_WORDS, *view, "--frames", "2", "--fps", "2", "-o", "g_#.exr")
+        self.assertNotEqual(self.picture("g_2.exr"), self.picture("f_00.exr"))
 
 
 class Denoise(SequenceTest):
