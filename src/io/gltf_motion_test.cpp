@@ -168,7 +168,8 @@ TEST_F(GltfMotion, NormalMapsFollowMirroredCoordinates) {
   for (const bool mirrored : {false, true}) {
     Gltf file = square({{"normalTexture", {{"index", 0}}}, {"pbrMetallicRoughness", {{"roughnessFactor", 0.3}}}});
     std::vector<unsigned char> texels;
-    for (int i = 0; i < 4; ++i) texels.insert(texels.end(), {128, 191, 238});  // (0, 0.5, 0.87)
+    for (int i = 0; i < 4; ++i)
+      for (const unsigned char value : {128, 191, 238}) texels.push_back(value);  // (0, 0.5, 0.87)
     const std::vector<unsigned char> bytes = encode_png(2, 2, texels);
     file.add("images", {{"bufferView", file.add_view({bytes.begin(), bytes.end()})}, {"mimeType", "image/png"}});
     file.add("textures", {{"source", 0}});
@@ -193,7 +194,8 @@ TEST_F(GltfMotion, CoatsHaveNormalsOfTheirOwn) {
                         {"pbrMetallicRoughness", {{"baseColorFactor", {0, 0, 0, 1}}, {"metallicFactor", 1}}},
                         {"extensions", {{"KHR_materials_clearcoat", coat}}}});
     std::vector<unsigned char> texels;
-    for (int i = 0; i < 4; ++i) texels.insert(texels.end(), {128, 191, 238});
+    for (int i = 0; i < 4; ++i)
+      for (const unsigned char value : {128, 191, 238}) texels.push_back(value);
     const std::vector<unsigned char> bytes = encode_png(2, 2, texels);
     file.add("images", {{"bufferView", file.add_view({bytes.begin(), bytes.end()})}, {"mimeType", "image/png"}});
     file.add("textures", {{"source", 0}});
