@@ -2,6 +2,7 @@
 """Every line of code in the documentation, as it stands, page by page and in order, in a folder with the files that its
 readers have (files.py). pages_test.py [PAGE…]: only these, e.g. docs/start.md."""
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -51,7 +52,7 @@ class Page:
             elif elsewhere(command.strip()):
                 self.not_run.append(f"{place}: runs elsewhere")
             else:
-                for name in inputs_of(shlex.split(command, comments=True)):
+                for name in inputs_of(shlex.split(re.sub(r"(?m)\s#\s.*$", "", command))):
                     self.files.make(name)
                 self.run(place, ["/bin/bash", "-ec", command], command)
 
