@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Progress for `progress=`: a line of text, `progress=True`, or a bar of tqdm. A function gets (done, total); one of
 three arguments also gets the phase of a render, "auxiliary images", "samples", "denoising" …, and is called from its
-beginning on."""
+beginning on. The numbers are pixels of auxiliary images, and samples; in later phases they stay."""
 from __future__ import annotations
 
 import importlib
@@ -14,7 +14,8 @@ from typing import Any, Union
 Phases = Callable[[int, int, str], object]
 RenderProgress = Union[Callable[[int, int], object], Phases, bool]
 
-_COUNTED = "samples"  # the phase whose numbers functions of two arguments get
+_BEFORE = ("short trials", "training", "auxiliary images")  # functions of two arguments do not hear of these
+_SHOWN = ("training", "auxiliary images", "samples")  # phases with numbers of their own
 
 
 def line() -> Phases:
@@ -24,7 +25,7 @@ def line() -> Phases:
 
     def update(done: int, total: int, phase: str) -> None:
         if sys.stderr.isatty():
-            text = f"{phase} {done / total:.0%}" if total else phase
+            text = f"{phase} {done / total:.0%}" if total and phase in _SHOWN else phase
             end = "\r\033[K" if phase == "writing" else ""  # the last
             print(f"\r{text}\033[K", end=end, file=sys.stderr, flush=True)
         elif phase != shown[0]:
@@ -69,7 +70,7 @@ def _phases(progress: RenderProgress | None) -> Phases | None:
         return function  # type: ignore[no-any-return]
 
     def counted(done: int, total: int, phase: str) -> None:
-        if phase == _COUNTED and total:
+        if phase not in _BEFORE and total:
             function(done, total)
 
     return counted

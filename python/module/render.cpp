@@ -182,7 +182,8 @@ nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Opti
         steps.watch(callbacks);
         callbacks.stop = &state.stop;
         callbacks.stage = [&](RenderStage stage) {
-          state.done = 0, state.total = 0;
+          // Later phases have no numbers of their own: those of the samples stay.
+          if (stage != RenderStage::kEstimating && stage != RenderStage::kWriting) state.done = 0, state.total = 0;
           state.phase = name_of(stage, settings.denoising.denoises());
         };
         callbacks.progress = [&](uint64_t done, uint64_t total) { state.done = done, state.total = total; };
