@@ -176,7 +176,9 @@ TEST_F(GltfReader, MaterialsAreThoseByHand) {
                             bitmap("t", "picture.png", false, moved) + "</texture>" +
                             bitmap("roughness", "rough.pfm", true, flip) + bitmap("metallic", "metal.pgm", true, flip) +
                             R"(<float name="clearcoat" value=".5"/><float name="clearcoat_roughness" value=".25"/>
-</bsdf></bsdf></bsdf></bsdf></shape><emitter type="constant"/>)");
+<rgb name="clearcoat_normal" value=".5, .5, 1"/>)" +
+                            bitmap("base_normal", "picture.png", true, flip) +
+                            R"(</bsdf></bsdf></bsdf></bsdf></shape><emitter type="constant"/>)");
   test_support::expect_same_scene(a, b, 100);
 }
 

@@ -412,7 +412,7 @@ TEST_F(Pbrt, MistakesOfTheTextEndTheReading) {
 }
 
 TEST_F(Pbrt, WhatLooksDifferentIsAWarning) {
-  const LoadedScene a = pbrt(R"(Integrator "mlt" PixelFilter "mitchell"
+  const LoadedScene a = pbrt(R"(Integrator "mlt" PixelFilter "box" "float xradius" 2
 WorldBegin
 LightSource "spot"
 Material "coateddiffuse" "float roughness" 0
@@ -422,7 +422,7 @@ ObjectInstance "lamp"
 )");
   std::string all;
   for (const std::string& warning : a.warnings) all += warning + "\n";
-  for (const char* message : {"Integrator \"mlt\" is read as 'path'", "PixelFilter \"mitchell\" is read as 'gaussian'",
+  for (const char* message : {"Integrator \"mlt\" is read as 'path'", "PixelFilter \"box\" is read as 'gaussian'",
                               "Material \"coateddiffuse\" is read as 'plastic'",
                               "Shape \"sphere\" emits no light, because it is part of an object"})
     EXPECT_TRUE(contains(all, message));
