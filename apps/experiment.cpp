@@ -82,7 +82,7 @@ lab::Suite builtin(const std::string& name) {
 
 /// The suite, not yet changed by the command's options.
 lab::Suite load_suite(const ExperimentCommand& command) {
-  const std::string word = scene_file(command.suite);  // `room` is a scene, too
+  const std::string& word = command.suite;
   const fs::path given(word);
   lab::Suite suite;
   if (given.extension() == ".json") {
@@ -298,6 +298,7 @@ void experiment(ExperimentCommand command) {
   lab::Programs programs, renderers;
   add_programs("--program", command.programs, programs);
   add_programs("--renderer", command.renderers, renderers);
+  command.suite = scene_file(command.suite);  // `room` is a scene, too
   lab::Suite suite = load_suite(command);
   add_methods_of_programs(programs, true, suite);
   add_methods_of_programs(renderers, false, suite);

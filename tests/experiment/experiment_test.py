@@ -437,6 +437,19 @@ class Programs(ExperimentTest):
         done = self.run_covary([COVARY, "experiment", str(SCENES / "room.xml"), "--print", "--program", "a=true"])
         self.assertEqual(json.loads(done.stdout)["methods"][-1],
                          {"name": "a", "options": ["--estimator", "none", "--groups", "8", "--aovs"], "program": "a"})
+        done = self.run_covary([COVARY, "experiment", "room", "--print", "--renderer", "b=true", "--methods-only", "b"])
+        suite = json.loads(done.stdout)
+        self.assertEqual(suite["methods"][1:], [{"name": "b", "options": [], "program": "b", "renders": False}])
+        self.assertEqual(Path(suite["scenes"][0]["file"]).name, "room.xml")
+
+    def test_given_images(self):
+        """Of which the program says how long they took."""
+        copy_it = 'given=cp "$COVARY_SCENE.$COVARY_SEED.exr" "$COVARY_OUTPUT" && echo seconds 12.5'
+        failed = self.results("--renderer", copy_it, "--program", 'mine=cp "$COVARY_IMAGE" "$COVARY_OUTPUT"',
+                              code=1)["failures"]
+        self.assertEqual([failure["method"] for failure in failed], ["given"])
+        self.bad(2, "--renderer 'mine' is the name of a --program, too", "--program", "mine=true", "--renderer",
+                 "mine=true")
 
     def test_mistakes(self):
         self.bad(2, "method 'copy' is made by a program of your own: give --program mine=COMMAND")
