@@ -128,8 +128,8 @@ class Scene:
         return relmse["relmse"], flip["flip"]
 
     def squared_bias(self, images):
-        """Mean over pairs of seeds of (M1 - R1)(M2 - R2) / (D^2 + 0.01), D: each reference denoised. Noise of the images
-        and of the references cancels."""
+        """Mean over pairs of seeds of (M1 - R1)(M2 - R2) / (D^2 + 0.01), D: each reference denoised. Noise of the
+        images and of the references cancels."""
         first, second = map(read_image, self.references())
         weight = sum(1 / (image.mean(2, keepdims=True)**2 + 0.01) for image in self.denoised_references()) / 2
         images = [read_image(path) for path in images]

@@ -540,8 +540,8 @@ class Time(RenderTest):
         for options in (IICV, [*IICV, "--adaptive"], ["--oidn", "off", "--adaptive"],
                         ["--oidn", "off", "--until", "relmse=100"]):
             with self.subTest(options):
-                result = self.good("render", ROOM, "--resolution", "200x150", "-o", "a.exr", "--time", "0.001", *options,
-                                   "--overwrite")
+                result = self.good("render", ROOM, "--resolution", "200x150", "-o", "a.exr", "--overwrite",
+                                   "--time", "0.001", *options)
                 self.assertRegex(result.stderr, r"warning: --time 0.001 is too short: the least takes about [0-9.e-]+ "
                                                 r"s \(")
                 late = result.stderr.find("was exceeded")
