@@ -13,6 +13,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "combine/beauty_layers.h"
 #include "combine/combine.h"
@@ -21,6 +22,7 @@
 #include "combine/result_file.h"
 #include "commands.h"
 #include "core/error.h"
+#include "core/memory_limit.h"
 #include "core/printable.h"
 #include "core/stopwatch.h"
 #include "declared_options.h"
@@ -138,25 +140,43 @@ Image as_alpha(const Image& grey) {
   return alpha;
 }
 
+/// Throws if the network needs too much: per pixel, images (the input, a copy, guides while they are read and the
+/// result) and, in tiles of limited size, its own values.
+void require_memory_of_network(const Options& o, const CropWindow& window) {
+  constexpr double kImageBytes = 7 * 3 * sizeof(float), kBytesOfTile = 600, kLargestTile = 2160.0 * 2160;
+  constexpr double kMebibyte = 1 << 20;
+  const double n_pixels = static_cast<double>(window.width) * window.height;
+  const double bytes = n_pixels * kImageBytes + std::min(n_pixels, kLargestTile) * kBytesOfTile;
+  if (o.memory_mib && bytes > *o.memory_mib * kMebibyte)
+    throw Error(
+        ErrorCode::kUsage,
+        fmt::format("{}: an image of {} x {} pixels needs {} of memory for Open Image Denoise; permitted are {} "
+                    "(--memory)",
+                    o.inputs[0], window.width, window.height, bytes_text(bytes),
+                    bytes_text(*o.memory_mib * kMebibyte)));
+  require_memory(o.inputs[0], fmt::format("an image of {} x {} pixels", window.width, window.height), bytes);
+}
+
 Denoised denoise_by_network(const Options& o, const Task& task, ProgressLine& progress) {
   const Stopwatch watch;
   const std::string& input = o.inputs[0];
   const ImageInfo info = inspect_image(input);
-  constexpr double kImages = 4 * 3 * sizeof(float), kNetworkBytes = 600;  // per pixel: image, guides and result
-  require_image_memory(input, info.place.window.width, info.place.window.height, kImages + kNetworkBytes);
-  const GuideLayers guides = guides_of(o, task, ImageRows(input, task.layer).colours());
+  require_memory_of_network(o, info.place.window);
+  GuideLayers guides = guides_of(o, task, ImageRows(input, task.layer).colours());
   const PlacedImage image = read_image(input, task.layer, ChecksumPolicy::kCheck, std::nullopt);
   warn_of_values(input, image.image);
   if (const std::string by = denoised_by(info.attributes, info.channels, task.layer); !by.empty())
     fmt::print(stderr, "warning: {} is denoised already ({}); give the render before denoising\n", input, by);
   progress.begin("denoising");
   Denoiser denoiser(o.denoiser());
-  std::optional<Image> albedo = guides.albedo, normal = guides.normal;
-  if (o.clean_guides && albedo) albedo = denoiser.denoise_guide("albedo", *albedo);
-  if (o.clean_guides && normal) normal = denoiser.denoise_guide("normal", *normal);
-  const auto denoised = [&](const Image& noisy) {
-    return denoiser.denoise(noisy, albedo ? &*albedo : nullptr, normal ? &*normal : nullptr, o.clean_guides);
+  const std::string guided = guides.text();
+  const auto taken = [&](const char* name, std::optional<Image>& guide) -> std::shared_ptr<const Image> {
+    if (!guide) return nullptr;
+    Image own = *std::exchange(guide, std::nullopt);
+    return std::make_shared<const Image>(o.clean_guides ? denoiser.denoise_guide(name, own) : std::move(own));
   };
+  const std::shared_ptr<const Image> albedo = taken("albedo", guides.albedo), normal = taken("normal", guides.normal);
+  const auto denoised = [&](const Image& noisy) { return denoiser.denoise(noisy, albedo, normal, o.clean_guides); };
   Denoised result;
   const std::vector<std::string> picture = layer_channels(input, info.channels, task.picture.layer);
   result.result.image.estimate = denoised(image.image);
@@ -167,7 +187,7 @@ Denoised denoise_by_network(const Options& o, const Task& task, ProgressLine& pr
   result.attributes = new_attributes(o);
   result.attributes["covary:denoiser"] = "Open Image Denoise " + denoiser_info(o.denoiser()).version;
   result.report = [=, width = image.image.width, height = image.image.height, seconds = watch.seconds(),
-                   text = guides.text()] {
+                   text = guided] {
     fmt::print(stderr, "{}{}: {} x {}, {}, in {:.2f} s\n", o.output, task.text(), width, height, text, seconds);
   };
   return result;

@@ -3,7 +3,7 @@
 """What every command makes of EXR files of others: read, or refused in words. Prints a table of outcomes by folder and
 command, and the words of each refusal; ends with code 1 if a command crashed or hung.
 
-    foreign_files.py FOLDER... [--covary build/release/covary]
+    foreign_files.py FOLDER... [--covary build/release/covary] [--commands info,convert]
 
 Searches the folders for *.exr. A file is denoised and combined with a copy of itself (--force: the seeds are the same),
 without a network."""
@@ -48,6 +48,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folders", nargs="+", type=Path)
     parser.add_argument("--covary", default="build/release/covary")
+    parser.add_argument("--commands", default=",".join(COMMANDS), help="default: all")
     options = parser.parse_args()
     covary = shutil.which(options.covary) or str(Path(options.covary).resolve())
     counts = collections.defaultdict(collections.Counter)
@@ -58,7 +59,8 @@ def main():
             with tempfile.TemporaryDirectory() as work:
                 copy = Path(work) / "copy.exr"
                 shutil.copy(path, copy)
-                for name, command in COMMANDS.items():
+                for name in options.commands.split(","):
+                    command = COMMANDS[name]
                     what, words = outcome(covary, command, path.resolve(), copy, work)
                     counts[folder.name, name][what] += 1
                     if what != "done":
