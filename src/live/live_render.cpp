@@ -75,7 +75,8 @@ void LiveRender::begun() {
     until_ = request.until;
   }
   const bool may_grow = request.seconds <= 0 && plan.estimator->passes != EstimatorPasses::kSamples;
-  page_.say({{"size", Json::array({window.width, window.height})},
+  page_.say({{"phase", "preparing"},
+             {"size", Json::array({window.width, window.height})},
              {"origin", Json::array({window.x, window.y})},
              {"can",
               {{"stop", true},
