@@ -15,7 +15,7 @@ class DepthIntegrator final : public Integrator {
     PathBatch& batch = context.state_as<PathBatch>();
     batch.start(samples.size());
     for (uint32_t i = 0; i < samples.size(); ++i) batch.rays[i] = samples[i].ray;
-    scene.nearest(batch.rays, batch.ray_hits, true);
+    scene.nearest(batch.rays, batch.ray_hits, false);
     context.n_rays += samples.size();
     for (size_t i = 0; i < samples.size(); ++i)
       if (batch.ray_hits[i].found()) samples[i].radiance = Spectrum(batch.ray_hits[i].t);

@@ -43,7 +43,8 @@ template <typename Batch, typename SetApart>
 void find_surfaces(const Scene& scene, int depth, bool hide_emitters, Batch& batch, PathContext& context,
                    const SetApart& set_apart) {
   const size_t n = batch.paths.size();
-  scene.nearest(batch.rays, batch.ray_hits, depth == 0);
+  // Camera rays are coherent, but traced as such their hits would depend on the others of the batch.
+  scene.nearest(batch.rays, batch.ray_hits, false);
   context.n_rays += n;
   for (size_t i = 0; i < n; ++i) {
     batch.paths[i].found = batch.ray_hits[i].found();

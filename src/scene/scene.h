@@ -89,7 +89,7 @@ class Scene {
 
   /// Nearest surface along the ray; false if there is none. Same as nearest() followed by resolve().
   bool intersect(const Ray& ray, SurfaceHit& hit) const;
-  /// Nearest hits of many rays. `coherent`: they share an origin and have similar directions.
+  /// Nearest hits of many rays. `coherent`: of one origin; of coincident surfaces, the others decide which is hit.
   void nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool coherent) const;
   /// Surface properties at a hit of `ray`, which must exist.
   void resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) const;
