@@ -186,7 +186,11 @@ nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Opti
           if (stage != RenderStage::kEstimating && stage != RenderStage::kWriting) state.done = 0, state.total = 0;
           state.phase = name_of(stage, settings.denoising.denoises());
         };
-        callbacks.progress = [&](uint64_t done, uint64_t total) { state.done = done, state.total = total; };
+        callbacks.progress = [&](uint64_t done, uint64_t total) {
+          state.total = total;
+          // Threads may tell their numbers in another order than they count.
+          for (uint64_t last = state.done; last < done && !state.done.compare_exchange_weak(last, done);) continue;
+        };
         callbacks.warning = [&](const std::string& text) {
           const std::lock_guard lock(mutex);
           warnings.push_back(as_arguments(text));
