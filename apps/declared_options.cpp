@@ -81,8 +81,7 @@ void add_scene_options(CLI::App& command, SceneOptions& options) {
       ->expected(1)
       ->allow_extra_args(false);
   command.add_flag("--ignore-unknown", options.ignore_unknown,
-                   "Warn of unknown plugins and parameters of the scene instead of refusing it; an unknown BSDF "
-                   "becomes grey");
+                   "Warn of unknown plugins and parameters; unknown BSDFs become grey");
 }
 
 LoadOptions load_options(const SceneOptions& options) {

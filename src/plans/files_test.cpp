@@ -94,7 +94,7 @@ TEST(Interrupted, AFilmThatIsTheOutputSaysThatItIsNotComplete) {
   RenderRequest request = request_of(96);
   request.output = folder.file("a.exr");
   request.aovs = true;
-  StopAfter stop(20);
+  StopAfter stop(30 + 20);  // rows of the auxiliary images, and tiles
   const RenderResult result = render(scene, plain_plan(Sampling::kIndependent), request, stop.callbacks);
   ASSERT_TRUE(result.interrupted);
   EXPECT_EQ(result.kept, request.output);

@@ -46,6 +46,11 @@ def exponential_noise(seed):
     return lambda: generator.expovariate(1)
 
 
+def line_of(start, text):
+    """The last line that begins so."""
+    return [line for line in text.splitlines() if line.startswith(start)][-1]
+
+
 class Denoise(RenderTest):
     def channels(self, name):
         return set(read_exr((self.path / name).read_bytes()))
@@ -184,8 +189,8 @@ class Denoise(RenderTest):
 
     def test_interval(self):
         render = ("render", MATERIALS, *SMALL[:2], "-o", "a.exr", "--spp", "48", *PLAIN, "--passes", "films", "--json",
-                  "a.json")
-        last = self.good(*render).stderr.splitlines()[-1]
+                  "a.json", "--verbose")
+        last = line_of("predicted relMSE", self.good(*render).stderr)
         facts = json.loads((self.path / "a.json").read_text())
         low, middle, high = (facts[f"predicted_relmse{end}"] for end in ("_low", "", "_high"))
         self.assertTrue(0 < low < middle < high, facts)
@@ -210,15 +215,15 @@ class Denoise(RenderTest):
         for name, options in (("mean", ("--estimator", "none", "--groups", "12")), ("pair", ("--estimator", "iicv")),
                               ("denoised pair", ("--estimator", "iicv", "--denoise", "auto", *PLAIN))):
             with self.subTest(name):
-                last = self.good("render", MATERIALS, *SMALL[:2], "-o", "k.exr", "--spp", "96", *options, "--json",
-                                 "k.json", "--overwrite").stderr.splitlines()[-1]
+                told = self.good("render", MATERIALS, *SMALL[:2], "-o", "k.exr", "--spp", "96", *options, "--json",
+                                 "k.json", "--overwrite", "--verbose").stderr
                 facts = json.loads((self.path / "k.json").read_text())
                 low, middle, high = (facts[f"predicted_relmse{end}"] for end in ("_low", "", "_high"))
                 self.assertTrue(0 < low < middle < high, facts)
-                self.assertRegex(last, r"predicted relMSE 0\.\d+, between 0\.\d+ and 0\.\d+ \(80 %\)")
+                self.assertRegex(told, r"predicted relMSE 0\.\d+, between 0\.\d+ and 0\.\d+ \(80 %\)")
                 attributes = json.loads(self.good("info", "k.exr", "--json").stdout)["attributes"]
-                for told, bound in zip(attributes["covary:predicted_relmse_80"].split(), (low, high), strict=True):
-                    self.assertAlmostEqual(float(told) / bound, 1, 3)
+                for value, bound in zip(attributes["covary:predicted_relmse_80"].split(), (low, high), strict=True):
+                    self.assertAlmostEqual(float(value) / bound, 1, 3)
         for seed in "12":
             self.good("render", MATERIALS, *SMALL[:2], "-o", f"{seed}.exr", "--spp", "48", "--estimator", "none",
                       "--denoise", "none", "--rfilter", "box", "--seed", seed, "--quiet")
