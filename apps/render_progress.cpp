@@ -5,7 +5,6 @@
 
 #include <algorithm>
 
-#include "core/error.h"
 #include "plans/budget.h"
 
 namespace covary {
@@ -16,24 +15,6 @@ constexpr double kSecondsWithNetwork = 12e-6, kSecondsWithFilters = 5e-6;
 /// A pixel of the auxiliary images, 16 to 64 rays, takes about as long as so many samples.
 constexpr double kAuxiliaryInSamples = 4;
 constexpr double kUnknownSamples = 1e15;  // a time limit ends them
-
-const char* name_of(RenderStage stage) {
-  switch (stage) {
-    case RenderStage::kTrial:
-      return "short trials";
-    case RenderStage::kTraining:
-      return "training";
-    case RenderStage::kAuxiliary:
-      return "auxiliary images";
-    case RenderStage::kRendering:
-      return "samples";
-    case RenderStage::kWriting:
-      return "writing";
-    case RenderStage::kEstimating:
-      break;
-  }
-  throw Error(ErrorCode::kInternal, "unknown stage of a render");
-}
 
 double expected_estimate(const RenderOptions& options, double n_pixels) {
   if (!options.settings.denoising.denoises()) return 0;
@@ -64,11 +45,8 @@ void RenderProgress::begin(RenderStage stage) {
   if (stage_ == RenderStage::kEstimating) estimate_seconds_ = of_stage_.seconds();
   stage_ = stage;
   of_stage_ = Stopwatch();
-  if (stage == RenderStage::kEstimating) {
-    line_.begin(estimate_name(options_));
-    return line_.expect(estimate_seconds_);
-  }
-  line_.begin(name_of(stage), stage == RenderStage::kRendering ? rendered_.load() : 0);
+  line_.begin(name_of(stage, estimate_name(options_).c_str()), stage == RenderStage::kRendering ? rendered_.load() : 0);
+  if (stage == RenderStage::kEstimating) line_.expect(estimate_seconds_);
   if (stage == RenderStage::kAuxiliary) line_.later(n_samples_ / kAuxiliaryInSamples, estimate_seconds_);
   if (stage == RenderStage::kRendering) line_.later(0, estimate_seconds_);
 }

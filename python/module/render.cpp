@@ -131,24 +131,6 @@ nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std:
   return d;
 }
 
-const char* name_of(RenderStage stage, bool denoises) {
-  switch (stage) {
-    case RenderStage::kTrial:
-      return "short trials";
-    case RenderStage::kTraining:
-      return "training";
-    case RenderStage::kAuxiliary:
-      return "auxiliary images";
-    case RenderStage::kRendering:
-      return "samples";
-    case RenderStage::kEstimating:
-      return denoises ? "denoising" : "combining";
-    case RenderStage::kWriting:
-      return "writing";
-  }
-  throw Error(ErrorCode::kInternal, "unknown stage of a render");
-}
-
 /// What the caller sees of a render that runs.
 struct Watching {
   nb::object progress;  ///< function of done and total, or None
@@ -184,7 +166,7 @@ nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Opti
         callbacks.stage = [&](RenderStage stage) {
           // Later phases have no numbers of their own: those of the samples stay.
           if (stage != RenderStage::kEstimating && stage != RenderStage::kWriting) state.done = 0, state.total = 0;
-          state.phase = name_of(stage, settings.denoising.denoises());
+          state.phase = name_of(stage, settings.denoising.denoises() ? "denoising" : "combining");
         };
         callbacks.progress = [&](uint64_t done, uint64_t total) {
           state.total = total;

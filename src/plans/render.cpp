@@ -49,6 +49,24 @@ void check(const LoadedScene& scene, const Plan& plan, const RenderRequest& requ
 
 }  // namespace
 
+const char* name_of(RenderStage stage, const char* estimating) {
+  switch (stage) {
+    case RenderStage::kTrial:
+      return "short trials";
+    case RenderStage::kTraining:
+      return "training";
+    case RenderStage::kAuxiliary:
+      return "auxiliary images";
+    case RenderStage::kRendering:
+      return "samples";
+    case RenderStage::kEstimating:
+      return estimating;
+    case RenderStage::kWriting:
+      return "writing";
+  }
+  throw Error(ErrorCode::kInternal, "unknown stage of a render");
+}
+
 const Pass& PlanState::pass(const std::string& name, uint32_t number) const {
   for (const Pass& pass : passes)
     if (pass.plan.name == name && pass.plan.number == number) return pass;

@@ -24,6 +24,8 @@ namespace covary {
 /// take; the integrator's training; auxiliary images; samples; the image of their films; files. Rendering and
 /// estimating may repeat, with RenderRequest::until.
 enum class RenderStage { kTrial, kTraining, kAuxiliary, kRendering, kEstimating, kWriting };
+/// The name of a phase for people; `estimating`: of kEstimating, since estimators do different things.
+const char* name_of(RenderStage stage, const char* estimating);
 
 /// Callbacks of a render. Any of them may be empty.
 struct RenderCallbacks {
