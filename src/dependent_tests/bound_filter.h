@@ -9,6 +9,7 @@
 //
 //     f_q = (lambda - Delta_q)^+ / v_q / sum_r (lambda - Delta_r)^+ / v_r,   sum_q ((lambda - Delta_q)^+)^2 / v_q = 9,
 //
+// as in linear estimation with a bound on the bias [SacksYlvisaker1978], [Nazin2007],
 // where eps = lambda: one increasing equation in one unknown, solved by Newton's method from above. Pixels may have any
 // number of samples, so no classes are needed; windows can be large; and as N grows the filter vanishes except among
 // pixels of equal C_d.

@@ -6,11 +6,11 @@
 // serve as control variates of a pixel; their unknown expectations are taken from the independent image, and the
 // coefficients account for its errors.
 //
-// The defaults extend the paper in three ways: errors common to all CRN pixels cancel
-// (`mean_constraint`), the penalty contains the expected as well as the realised error of independent pixels
-// (`sample_fraction`), and what the penalty removes is restored (`residual_correction`). IicvOptions::paper() has none
-// of them. With the first, regions where the CRN image misses light fall back to the independent image
-// (missing_light.h).
+// The defaults extend the paper in three ways: errors common to all CRN pixels cancel (`mean_constraint`, as calibrated
+// weights of surveys do [DevilleSarndal1992]), the penalty contains the expected as well as the realised error of
+// independent pixels (`sample_fraction`), and what the penalty removes is restored (`residual_correction`).
+// IicvOptions::paper() has none of them. With the first, regions where the CRN image misses light fall back to the
+// independent image (missing_light.h).
 //
 // Consistent, not unbiased: coefficients and penalties are estimated from the samples they are applied to. Pixels of
 // the independent image must be independent of each other (box filter), values linear.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Number of samples for each pixel, from the means C and variances sigma^2 of a first pass.
+// Number of samples for each pixel, from the means C and variances sigma^2 of a first pass: adaptive sampling
+// [Mitchell1987], biased if the first samples stay in the image [KirkArvo1991].
 //
 //   equal-error   the same relative error eps in all pixels, [Csonka2002] Sec. 5: N = (3 sigma / (eps |C|))^2 - n with
 //                 the samples n of the first pass. Dark and noisy pixels take nearly everything.

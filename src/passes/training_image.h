@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The image of a training's samples. Each wave's samples depend only on earlier waves, so each wave's mean is unbiased,
-// and the variance decreases from wave to wave. Waves are combined with inverse-variance weights.
+// and the variance decreases from wave to wave. Waves are combined with inverse-variance weights
+// [Muller2019].
 //
 // Weights must not depend on the samples they weight: bright samples, which raise a wave's variance, would count too
 // little. So the two colours of a checkerboard of pixels are combined separately, each with the other's variances.

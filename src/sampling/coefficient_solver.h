@@ -14,9 +14,10 @@
 // that their part of A is diagonal; the others (directions by the BSDF or its lobes, the environment) form a small
 // dense block.
 //
-// Ours: a system's solution is shrunk towards that of its surroundings (the *prior*), with a weight of a few samples
-// per technique. So a technique without samples keeps the prior's value and does not affect the others, a singular
-// system has a solution, and with little data the plain estimate remains.
+// Densities of a mixture as control variates are from [OwenZhou2000]. Beyond [Hua2023], a system's solution is shrunk
+// towards that of its surroundings (the *prior*), with a weight of a few samples per technique. So a technique without
+// samples keeps the prior's value and does not affect the others, a singular system has a solution, and with little
+// data the plain estimate remains.
 #pragma once
 
 #include <cstdint>
