@@ -3,6 +3,8 @@
 // dimensions: no random numbers, so every statement is exact up to rounding.
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
+#include <algorithm>
 #include <functional>
 
 #include "core/vec.h"
@@ -339,11 +341,16 @@ TEST(ControlledMixture, TakesAwayTheNoiseOfSigns) {
   problem.integrand = integrand(n, [&](double x) { return Spectrum(static_cast<float>(sine(x))); });
   EXPECT_NEAR(std::pow(2 / static_cast<double>(kPi), 2), problem.plain_variance().r, 1e-4);
   EXPECT_NEAR(0, problem.variance(problem.solve()).r, 1e-6);
-  // Densities that fit less well: nearly all of the noise is still removed.
+  // Densities that fit less well: nearly all of the noise is still removed. One sample with control has twice the
+  // variance of one sample of each component without, 0.033 and 0.016 in the paper: nothing is left of the choice.
   Problem rough = mixture(n, {{0.5, density(n, [](double x) { return x < 0.5 ? x * (0.5 - x) : 0; })},
                               {0.5, density(n, [](double x) { return x > 0.5 ? (x - 0.5) * (1 - x) : 0; })}});
   rough.integrand = problem.integrand;
-  EXPECT_LT(rough.variance(rough.solve()).r, 0.05f * rough.plain_variance().r);
+  const float controlled = rough.variance(rough.solve()).r;
+  EXPECT_LT(controlled, 0.05f * rough.plain_variance().r);
+  Problem both = rough;
+  for (uint32_t i = 0; i < 2; ++i) both.dense[i].count = 1, both.dense[i].strategy = i;
+  EXPECT_NEAR(2, controlled / both.plain_variance().r, 1e-3);
 }
 
 /// Sec. 5.3.1, Fig. 5: one component is perfect but rarely chosen.
@@ -354,6 +361,74 @@ TEST(ControlledMixture, RestoresThePerfectComponentOfAMixture) {
   problem.integrand = integrand(n, [&](double x) { return Spectrum(static_cast<float>(sky(x))); });
   EXPECT_GT(problem.plain_variance().r, 0.05f);
   EXPECT_NEAR(0, problem.variance(problem.solve()).r, 1e-6);
+}
+
+/// Sec. 5.3.1: the variance is at most σ_t² / c_t for every component t of probability c_t, σ_t² being the variance of
+/// its samples alone. The plain mixture does not keep to that.
+TEST(ControlledMixture, IsAsGoodAsSamplesOfTheBestComponentAlone) {
+  constexpr size_t n = 300;
+  uint64_t state = 1;
+  const auto number = [&] { return static_cast<double>(mix64(state++) >> 40) * 0x1p-24; };
+  int n_plain_above = 0;
+  for (int trial = 0; trial < 50; ++trial) {
+    const auto smooth = [&] {
+      const double centre = number(), width = 0.05 + 0.3 * number(), floor = 0.02 + 0.2 * number();
+      return density(n, [=](double x) { return bump(x, centre, width) + floor; });
+    };
+    const double c = 0.1 + 0.5 * number();
+    Problem problem = mixture(n, {{c, smooth()}, {0.9 - c, smooth()}, {0.1, smooth()}});
+    const std::vector<double>& near = problem.dense[static_cast<size_t>(trial % 3)].density;
+    const double change = 0.2 * number();
+    problem.integrand.resize(n);
+    for (size_t x = 0; x < n; ++x)
+      problem.integrand[x] = Spectrum(static_cast<float>(near[x] + change * std::sin(0.05 * static_cast<double>(x))));
+    double bound = 1e30, integral = 0;
+    for (const Spectrum& f : problem.integrand) integral += f.r / static_cast<double>(n);
+    for (const Technique& t : problem.dense) {
+      double second = 0;
+      for (size_t x = 0; x < n; ++x)
+        second += problem.integrand[x].r * problem.integrand[x].r / t.density[x] / static_cast<double>(n);
+      bound = std::min(bound, (second - integral * integral) / t.count);
+    }
+    EXPECT_LE(problem.variance(problem.solve()).r, 1.0001 * bound + 1e-6) << trial;
+    n_plain_above += problem.plain_variance().r > 1.01 * bound + 1e-6;
+  }
+  EXPECT_GT(n_plain_above, 25);
+}
+
+/// Appendix A, Eqs. (34) to (40): adding C_A to all of A and C_B to all of b shifts the solution by n_j c_j C with
+/// C = C_A Σ α' − C_B, which changes no estimate; the program's solution is one of the same line.
+TEST(ControlledMixture, ShiftedSystemsHaveShiftedSolutions) {
+  constexpr size_t n = 400;
+  Problem problem = mixture(n, {{0.5, density(n, [](double) { return 1; })},
+                                {0.3, density(n, [](double x) { return bump(x, 0.3, 0.2) + 0.01; })},
+                                {0.2, density(n, [](double x) { return 0.1 + x * x; })}});
+  problem.integrand = integrand(n, [](double x) { return Spectrum(static_cast<float>(std::exp(x) * (x < 0.6))); });
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero(), counts;
+  for (size_t i = 0; i < 3; ++i) {
+    const std::vector<double>& own = problem.dense[i].density;
+    const auto row = static_cast<Eigen::Index>(i);
+    counts[row] = problem.dense[i].count;
+    for (size_t x = 0; x < n; ++x) {
+      const double part = own[x] / problem.p(x) / static_cast<double>(n);
+      b[row] += part * problem.integrand[x].r;
+      for (size_t j = 0; j < 3; ++j) A(row, static_cast<Eigen::Index>(j)) += part * problem.dense[j].density[x];
+    }
+  }
+  const Eigen::Vector3d alpha = A.fullPivLu().solve(b);
+  for (const auto& [C_A, C_B] : {std::pair{1.0, 0.5}, std::pair{-0.4, 2.0}, std::pair{3.0, -1.0}}) {
+    const Eigen::Matrix3d shifted_A = A.array() + C_A;
+    const Eigen::Vector3d shifted = shifted_A.fullPivLu().solve(Eigen::Vector3d(b.array() + C_B));
+    const double C = C_A * shifted.sum() - C_B;
+    EXPECT_LT((alpha - shifted - C * counts).norm(), 1e-9) << C_A << " " << C_B;
+    EXPECT_GT(std::abs(C), 0.1);
+  }
+  const Coefficients found = problem.solve();
+  for (size_t j = 1; j < 3; ++j) {
+    const auto row = static_cast<Eigen::Index>(j);
+    EXPECT_NEAR(alpha[row] / counts[row] - alpha[0] / counts[0], found.dense[j].r - found.dense[0].r, 1e-4);
+  }
 }
 
 /// Sec. 5.3.2, Fig. 6: two components oversample the dark sky and undersample the sun.
