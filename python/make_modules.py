@@ -128,7 +128,10 @@ def keywords_module(lists, own):
     types = {}
     for option in (option for options in lists for option in options):
         types.setdefault(identifier(option["name"]), set()).update(type_and_default(option)[0].split(" | "))
-    lines = "\n".join(wrapped(f"{name}: {' | '.join(sorted(kinds))}", "    ") for name, kinds in sorted(types.items())
+    def ordered(kinds):
+        return " | ".join(sorted(kinds, key=lambda kind: (kind == "None", kind)))
+
+    lines = "\n".join(wrapped(f"{name}: {ordered(kinds)}", "    ") for name, kinds in sorted(types.items())
                       if name not in own)
     head = HEAD.format("Keywords of functions that take options.", ", Literal, TypedDict",
                        "if TYPE_CHECKING:\n    from os import PathLike\n\n")

@@ -4,6 +4,7 @@ raises an exception with the argument's name, the value and what was expected. A
 read (module/arrays.cpp), names of estimators and their options by the registry."""
 from __future__ import annotations
 
+import difflib
 import functools
 import inspect
 import math
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import Any, ParamSpec, TypeVar
 
+from ._keywords import RenderOptions
 from .errors import UsageError
 
 P = ParamSpec("P")
@@ -247,6 +249,20 @@ def either(words: str, *rules: Rule) -> Rule:
     return Rule(words, convert)
 
 
+def _type_of_option(name: str) -> Any:
+    """Of a declared option, as text like the annotations of arguments."""
+    return getattr(RenderOptions.__annotations__[name], "__forward_arg__", inspect.Parameter.empty)
+
+
+def check_names(options: Iterable[str], arguments: Iterable[str]) -> None:
+    """Raises UsageError for keywords that are misspelt arguments. Other unknown ones are left to the registry, which
+    knows the options of estimators."""
+    for name in options:
+        near = difflib.get_close_matches(name, arguments, 1, 0.8)
+        if name not in RenderOptions.__annotations__ and near:
+            raise UsageError(f"{name}: there is no such argument; did you mean {near[0]}?")
+
+
 def checked(declared: Mapping[str, Rule] | None = None, /, **rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Gives each argument of a function its rule. Arguments without a rule, and rules without an argument, are bugs of
     the package, found when it is imported. `declared`: rules of options that arrive in the function's **options."""
@@ -271,9 +287,8 @@ def checked(declared: Mapping[str, Rule] | None = None, /, **rules: Rule) -> Cal
 
         call.rules = {**rules, **more}  # type: ignore[attr-defined]
         if more:  # what help and completion show
-            standard = {name: False if rule is flag else None for name, rule in more.items()}
-            shown[-1:-1] = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=value)
-                            for name, value in standard.items()]
+            shown[-1:-1] = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=_type_of_option(name),
+                                              default=False if rule is flag else None) for name, rule in more.items()]
             call.__signature__ = signature.replace(parameters=shown)  # type: ignore[attr-defined]
         return call
 

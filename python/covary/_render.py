@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal, Union, get_args
 
 from . import _covary
 from ._arguments import (
-    checked, choice, either, empty_or, flag, function, instance, mapping_of, optional, path, real, scalar, several,
-    text, whole,
+    check_names, checked, choice, either, empty_or, flag, function, instance, mapping_of, optional, path, real, scalar,
+    several, text, whole,
 )
 from ._combine import DENOISE, DenoiseMode
 from ._options import DEFAULT, declared_rules, option_texts, passes_of, text_options, underscored
@@ -216,6 +216,7 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     """
     keywords: dict[str, Any] = dict(options)
     _check_scene_arguments(scene, keywords)
+    check_names(keywords, render.rules)  # type: ignore[attr-defined]
     _check_together(estimator, {"resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "preview": preview,
                                 "output": output, "passes": passes, "until": until, "until_p95": until_p95,
                                 "until_relative": until_relative,

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from ._arguments import (
-    Rule, checked, choice, empty_or, flag, function, instance, optional, path, real, several, text, whole,
+    Rule, check_names, checked, choice, empty_or, flag, function, instance, optional, path, real, several, text, whole,
 )
 from ._combine import DENOISE, DenoiseMode, Progress
 from ._options import DEFAULT, option_texts, text_options
@@ -99,6 +99,7 @@ def render_frames(scene: str | PathLike[str], output: str | PathLike[str], frame
     if "#" not in pattern:
         raise UsageError(f"output: found {pattern!r}; expected a name with '#' for the frame number, \"out_####.exr\"")
     keywords: dict[str, Any] = dict(options)
+    check_names(keywords, render_frames.rules)  # type: ignore[attr-defined]
     declared = {name.replace("_", "-"): keywords.pop(name) for name in _OPTIONS if name in keywords}
     values = option_texts({
         "output": pattern, "frames": words, "spp": spp, "time": time, "seed": seed or None, "estimator": estimator,

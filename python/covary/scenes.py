@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ._arguments import checked, text
-from .errors import UsageError
+from .errors import IoError, UsageError
 
 _FOLDER = Path(__file__).parent / "share" / "covary" / "scenes"  # where the package's program looks, too
 
@@ -16,9 +16,14 @@ def names() -> list[str]:
 
 
 def _file_of(scene: str) -> str:
-    """`scene`, the name of a file; or, if there is no such file, the file of the scene that comes under that name."""
-    known = "/" not in scene and not Path(scene).exists() and scene in names()
-    return str(_FOLDER / f"{scene}.xml") if known else scene
+    """`scene`, the name of a file; or, if there is no such file, the file of the scene that comes under that name.
+    Raises IoError for a word that is neither."""
+    if "/" in scene or Path(scene).suffix or Path(scene).exists():
+        return scene
+    if scene not in names():
+        raise IoError(f"cannot read '{scene}': there is no such file, and covary comes with no scene of that name, but "
+                      f"with {', '.join(names())}")
+    return str(_FOLDER / f"{scene}.xml")
 
 
 @checked(name=text)

@@ -280,11 +280,28 @@ class Arguments(PackageTest):
         of_scene = {"resolution", "environment", "background", "camera"}
         self.assertEqual({other.get(name, name) for name in declared} - of_scene, taken)
         self.assertLessEqual(of_scene, set(inspect.signature(covary.Scene.load).parameters))
+        own = inspect.signature(inspect.unwrap(covary.render)).parameters
         for name, parameter in inspect.signature(covary.render).parameters.items():
+            self.assertIsNot(parameter.annotation, parameter.empty, name)
             lines = re.findall(rf"^(?:.*[ ,])?{name}[,:]", covary.render.__doc__, re.M)
-            if parameter.annotation is parameter.empty:  # as declared
+            if name not in own:  # as declared
                 self.assertEqual(lines, [f"{name}:"])
                 self.assertIn(parameter.default, (None, False))
+
+    def test_types_of_options_are_shown(self):
+        shown = inspect.signature(covary.render).parameters
+        self.assertEqual({name: shown[name].annotation for name in ("aovs", "groups", "sampler", "exposure")},
+                         {"aovs": "bool", "groups": "int | None", "exposure": "float | None",
+                          "sampler": "Literal['independent', 'sobol'] | None"})
+
+    def test_misspelt_arguments(self):
+        for call in (covary.render, lambda *scene, **given: covary.render_frames(*scene, "a_#.exr", "1", **given)):
+            self.assertIn("theads: there is no such argument; did you mean threads?",
+                          self.message_of(covary.UsageError, call, ROOM, theads=2))
+        self.assertIn("windwo is not an option of any estimator; did you mean 'window'?",
+                      self.message_of(covary.UsageError, covary.render, ROOM, 24, "iicv", windwo=3))
+        self.assertIn("cannot read 'rom': there is no such file, and covary comes with no scene of that name, but with ",
+                      self.message_of(covary.IoError, covary.render, "rom"))
 
     def test_options_of_combining_are_arguments(self):
         """All that the library declares, under their names but for these; guides are five images, and some are of files
