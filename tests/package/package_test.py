@@ -113,6 +113,8 @@ class Package(unittest.TestCase):
         for given, expected in (((), 1.75), (("max-reflections=0",), 1), (("max-reflections=5",), 1.96875)):
             printed = self.run_in_folder(program, "furnace.xml", *given)
             self.assertAlmostEqual(float(printed.removeprefix("mean ")), expected, 5)
+        printed = self.run_in_folder(program, SOURCE / "scenes" / "furnace.xml", "max-reflections=3")
+        self.assertAlmostEqual(float(printed.removeprefix("mean ")), 1.875, 5)
         with self.assertRaisesRegex(AssertionError, "`max-reflections` 'x': expected a whole number from 0 to 1000"):
             self.run_in_folder(program, "furnace.xml", "max-reflections=x")
 

@@ -44,6 +44,7 @@ int main(int argc, char** argv) try {
   if (argc == 3 && std::strncmp(argv[2], "max-reflections=", 16) == 0) given["max-reflections"] = argv[2] + 16;
   LoadOptions load;
   load.make_integrator = [&](Parameters& parameters) {
+    if (parameters.type() != "reflections") parameters.ignore_rest();  // of the integrator that this one replaces
     PropertySource source(parameters, given);  // the scene file's parameters, overridden by `given`
     Settings settings(source);
     const auto integrator = std::make_shared<Reflections>();
