@@ -191,18 +191,22 @@ void LiveRender::show_denoised(std::span<const Pass> passes) {
   if (!makes_image(plan)) return;
   const std::span<const Pass> cameras = camera_passes(passes);
   const Film &first = cameras.front().film, &last = cameras.back().film;
+  const bool is_pair = cameras.size() > 1 && plan.estimator->passes == EstimatorPasses::kPair;
+  // Such estimators read counts and variances of samples, which only whole films have.
+  const bool whole = is_pair && plan.estimator->adaptive && !plan.estimator->adaptive->reads_groups;
   int groups = std::min(first.groups(), last.groups());
   for (const Film* film : {&first, &last})
     for (const uint32_t count : film->counts()) groups = std::min<int>(groups, static_cast<int>(count));
-  if (groups < plan.estimator->fewest_groups || groups < 1) return;
+  if (!whole && (groups < plan.estimator->fewest_groups || groups < 1)) return;
   const double area = static_cast<double>(first.width()) * first.height() * denoised_pixel_cost_;
   int stride = 1;
-  while (stride < kMostStride && !may_spend(area / (stride * stride))) stride *= 2;
+  while (!whole && stride < kMostStride && !may_spend(area / (stride * stride))) stride *= 2;
   if (!may_spend(area / (stride * stride))) return;
   const Stopwatch watch;
-  const bool is_pair = cameras.size() > 1 && plan.estimator->passes == EstimatorPasses::kPair;
-  const CoarseGroups independent = coarse_groups(last, stride, groups);
-  const CoarseGroups crn = is_pair ? coarse_groups(first, stride, groups) : CoarseGroups{};
+  const auto taken = [&](const Film& film) {
+    return whole ? CoarseGroups{{}, rows_of(film, 0, film.height())} : coarse_groups(film, stride, groups);
+  };
+  const CoarseGroups independent = taken(last), crn = is_pair ? taken(first) : CoarseGroups{};
   std::map<std::string, Image> aovs;
   if (aovs_ && plan.estimator->reads_guides)
     for (const auto& [name, image] : *aovs_) aovs[name] = coarse_image(image, stride);

@@ -209,6 +209,18 @@ class Picture(LiveTest):
                 program.wait()
                 self.assertEqual(self.pixels("out.exr"), plain, program.said)
 
+    def test_adaptive_pairs_are_combined_on_the_way(self):
+        """The filtered and combined image of dependent tests, while its second pass goes on."""
+        program = self.start("--estimator", "dependent-tests", "--paper", "--dependent-spp", "8", "--spp", ENDLESS)
+        state = program.until(lambda state: len(state["pictures"]) == 2 and "samples" in state["pictures"][1]["label"])
+        self.assertEqual([p["name"] for p in state["pictures"]], ["Mean", "Image"])
+        self.assertNotIn("ended", state)
+        shown = program.image("picture", state["images"]["picture"])
+        self.assertEqual((len(shown), len(shown[0])), (3, SIZE[0] * SIZE[1]))
+        mean = sum(map(sum, shown)) / (3 * len(shown[0]))
+        reference = self.render("mean.exr", "--estimator", "none", "--spp", "64")
+        self.assertAlmostEqual(mean, sum(map(sum, reference)) / (3 * len(reference[0])), delta=0.1 * mean)
+
     def test_phone(self):
         page = self.open(self.start("--spp", ENDLESS), (390, 844))
         self.shown(page)
