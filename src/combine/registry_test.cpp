@@ -85,7 +85,7 @@ OptionValues with_what_it_needs(const std::string& name, OptionValues values) {
   const auto given = [&](std::initializer_list<const char*> options) {
     return std::any_of(options.begin(), options.end(), [&](const char* o) { return values.contains(o); });
   };
-  if (given({"max-region", "min-centre-drop"})) values["paper"] = "";
+  if (given({"max-region", "min-centre-drop", "falloff"})) values["paper"] = "";
   if (has(options_of_estimator(name), "adaptive")) values["adaptive"] = "";
   return values;
 }
@@ -114,8 +114,9 @@ TEST(EstimatorRegistry, ValuesReachTheOptions) {
   EXPECT_EQ(made("cv-baseline", {{"k", "9"}, {"window", "5"}, {"ridge", "0.001"}}),
             cv_baseline(g, h, baseline).estimate.data);
   DependentTestsOptions tests = DependentTestsOptions::paper();
-  tests.regions = {6, 0.001f};
-  EXPECT_EQ(made("dependent-tests", {{"paper", ""}, {"max-region", "6"}, {"min-centre-drop", "0.001"}}),
+  tests.regions = {6, 0.001f, Falloff::kSpline};
+  EXPECT_EQ(made("dependent-tests",
+                 {{"paper", ""}, {"max-region", "6"}, {"min-centre-drop", "0.001"}, {"falloff", "spline"}}),
             dependent_tests(g, h, tests).estimate.data);
   DependentTestsOptions exact;
   exact.window = 5;
@@ -227,6 +228,7 @@ TEST(EstimatorRegistry, OptionsWithoutEffectAreErrors) {
       {"iicv", "max-spp", {{"max-spp", "99"}}},
       {"dependent-tests", "max-region", {{"max-region", "3"}}},
       {"dependent-tests", "min-centre-drop", {{"min-centre-drop", "0.1"}}},
+      {"dependent-tests", "falloff", {{"falloff", "count"}}},
       {"dependent-tests", "window", {{"paper", ""}, {"window", "5"}}},
   };
   for (const Case& c : cases)

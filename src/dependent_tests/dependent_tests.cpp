@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "dependent_tests/least_error_mixture.h"
 #include "estimators/control_variates.h"
@@ -209,13 +210,19 @@ namespace {
 
 /// Declares its own options; those of --adaptive were declared before.
 void declare(Settings& p, DependentTestsOptions& o) {
+  static constexpr std::pair<const char*, Falloff> kFalloffs[] = {{"pyramid", Falloff::kPyramid},
+                                                                  {"count", Falloff::kCount},
+                                                                  {"spline", Falloff::kSpline},
+                                                                  {"gaussian", Falloff::kGaussian}};
   p.whole("window", o.window, kWindowRange, kWindowHelp);
   p.whole("max-region", o.regions.max_region, {.low = 1, .high = 63}, "Maximum side of a region of `paper`");
   p.real("min-centre-drop", o.regions.min_centre_drop, {.low = 0},
          "Regions grow while their centre's weight drops by at least this much");
+  p.choice<Falloff>("falloff", o.regions.falloff, kFalloffs, "Weight by distance; count: pyramid by number of pixels");
   const bool exact = o.filter == DependentFilter::kExact;
   p.only_if(exact, {"window"}, "with `paper`");
-  p.only_if(!exact, {"max-region", "min-centre-drop"}, "without `paper`: only the published filter has regions");
+  p.only_if(!exact, {"max-region", "min-centre-drop", "falloff"},
+            "without `paper`: only the published filter has regions");
 }
 
 }  // namespace

@@ -71,8 +71,28 @@ double bound_of(const std::vector<Partner>& window, const std::vector<double>& w
   return 3 * std::sqrt(squares) + distortion;
 }
 
+/// d of a pixel at this distance in a region of side m with M pixels.
+double by_distance(Falloff falloff, double distance, int m, double M) {
+  const double end = m / std::sqrt(2.0), t = distance / end;
+  switch (falloff) {
+    case Falloff::kPyramid:
+      return std::max(0.0, end - distance);
+    case Falloff::kCount:
+      return std::max(0.0, M / std::sqrt(2.0) - distance);
+    case Falloff::kGaussian:
+      return std::exp(-std::pow(2 * distance / m, 2));
+    case Falloff::kSpline:
+      break;
+  }
+  // The cubic B-spline on [-1, 1], as a sum of truncated powers.
+  double sum = 0;
+  const double factors[] = {1, -4, 6, -4, 1};
+  for (int i = 0; i < 5; ++i) sum += factors[i] * std::pow(std::max(0.0, 2 * t + 2 - i), 3) / 6;
+  return std::max(0.0, sum);
+}
+
 /// The published weights, recomputed for a given side.
-std::vector<double> published_weights(const FilterInput& input, int x, int y, int m) {
+std::vector<double> published_weights(const FilterInput& input, int x, int y, int m, Falloff falloff) {
   const std::vector<Partner> window = partners(input, x, y, -((m - 1) / 2), m / 2);
   const auto M = static_cast<double>(window.size());
   const double N = input.count.row(0, y)[x], sigma = std::sqrt(input.variance.row(0, y)[x]);
@@ -81,8 +101,7 @@ std::vector<double> published_weights(const FilterInput& input, int x, int y, in
   std::vector<double> weights;
   for (const Partner& q : window) {
     const double f = 1 / M + std::sqrt(N) / (3 * sigma * std::sqrt(M)) * (mean - q.difference);
-    const double d = m / std::sqrt(2.0) - std::hypot(q.x - x, q.y - y);
-    weights.push_back(std::max(0.0, f) * std::max(0.0, d));
+    weights.push_back(std::max(0.0, f) * by_distance(falloff, std::hypot(q.x - x, q.y - y), m, M));
     sum += weights.back();
   }
   for (double& w : weights) w /= sum;
@@ -185,20 +204,21 @@ TEST(Filters, ManySamplesMakeTheExactOneVanishAndNotThePublishedOne) {
 }
 
 TEST(RegionFilter, IncrementalSumsEqualDirectOnes) {
-  for (const int m : {2, 3, 4, 5, 8}) {
-    const FilterInput input = random_input(7, 0.3f, 12);
-    const FilteredImage result = region_filter(input, {.max_region = m, .min_centre_drop = -1});  // always grows
-    for (const auto& [x, y] : {std::pair{9, 6}, {0, 0}, {18, 12}, {0, 7}}) {
-      const std::vector<Partner> window = partners(input, x, y, -((m - 1) / 2), m / 2);
-      const std::vector<double> weights = published_weights(input, x, y, m);
-      double colour = 0;
-      for (size_t i = 0; i < window.size(); ++i)
-        colour += weights[i] * input.independent.row(1, window[i].y)[window[i].x];
-      EXPECT_EQ(result.region.pixel(x, y)[0], static_cast<float>(window.size()));
-      EXPECT_NEAR(result.colour.pixel(x, y)[1], colour, 1e-4);
-      EXPECT_NEAR(result.bound.pixel(x, y)[0], bound_of(window, weights), 1e-3);
+  const FilterInput input = random_input(7, 0.3f, 12);
+  for (const Falloff falloff : {Falloff::kPyramid, Falloff::kCount, Falloff::kSpline, Falloff::kGaussian})
+    for (const int m : {2, 3, 4, 5, 8}) {
+      const FilteredImage result = region_filter(input, {m, -1, falloff});  // always grows
+      for (const auto& [x, y] : {std::pair{9, 6}, {0, 0}, {18, 12}, {0, 7}}) {
+        const std::vector<Partner> window = partners(input, x, y, -((m - 1) / 2), m / 2);
+        const std::vector<double> weights = published_weights(input, x, y, m, falloff);
+        double colour = 0;
+        for (size_t i = 0; i < window.size(); ++i)
+          colour += weights[i] * input.independent.row(1, window[i].y)[window[i].x];
+        EXPECT_EQ(result.region.pixel(x, y)[0], static_cast<float>(window.size()));
+        EXPECT_NEAR(result.colour.pixel(x, y)[1], colour, 1e-4);
+        EXPECT_NEAR(result.bound.pixel(x, y)[0], bound_of(window, weights), 1e-3);
+      }
     }
-  }
 }
 
 TEST(RegionFilter, GrowsWhileTheCentreLosesWeight) {

@@ -43,17 +43,32 @@ struct Region {
 };
 
 /// Weights before normalisation, [Csonka2002] Sec. 4: with f = 1/M + sqrt(N) / (3 sigma sqrt(M)) (mean of Delta -
-/// Delta_q) and d = m / sqrt(2) - distance, the weights are f* = max(f, 0) d over their sum.
+/// Delta_q) and d by distance, the weights are f* = max(f, 0) d over their sum.
 struct Kernel {
-  vfloat slope, offset, height;  // f = offset - slope * Delta, d = height - distance
+  vfloat slope, offset, reach;  // f = offset - slope * Delta; d is 0, or small, where the distance is `reach`
+  Falloff falloff;
 
-  Kernel(const Region& region, vfloat deviation)
+  Kernel(const Region& region, vfloat deviation, Falloff by_distance)
       : slope(1.0f / (deviation * sqrt(region.size))),  // sqrt(N) / (3 sigma sqrt(M))
         offset(1.0f / region.size + slope * region.differences / region.size),
-        height(region.side * std::sqrt(0.5f)) {}
+        reach((by_distance == Falloff::kCount ? region.size : region.side) * std::sqrt(0.5f)),
+        falloff(by_distance) {}
 
+  /// d
+  vfloat by_distance(float distance) const {
+    if (falloff == Falloff::kGaussian) {
+      const vfloat u = splat(distance) / reach;
+      return exp_of_nonpositive(-2.0f * u * u);
+    }
+    if (falloff == Falloff::kSpline) {
+      const vfloat u = min(splat(2 * distance) / reach, splat(2)), left = 2.0f - u;
+      const vfloat inner = 2.0f / 3.0f - u * u + 0.5f * u * u * u, outer = left * left * left / 6.0f;
+      return u < splat(1) ? inner : outer;
+    }
+    return max(reach - distance, splat(0));
+  }
   vfloat weight(vfloat difference, float distance) const {
-    return max(offset - slope * difference, splat(0)) * max(height - distance, splat(0));  // f+ d, Sec. 4
+    return max(offset - slope * difference, splat(0)) * by_distance(distance);  // f+ d, Sec. 4
   }
 };
 
@@ -93,7 +108,7 @@ class RegionBatch {
     for (int m = 2; m <= options_.max_region && any(grows); ++m) {
       grows &= ~add_places(m, region);
       if (!any(grows)) break;
-      const Kernel kernel(region, deviation_);
+      const Kernel kernel(region, deviation_, options_.falloff);
       vfloat sum{};
       for (size_t i = 0; i < places_.first[m]; ++i)
         sum += inside_[i] * kernel.weight(differences_[i], places_.list[i].distance);
@@ -131,7 +146,7 @@ class RegionBatch {
   }
 
   void write(const Region& region, int n, FilteredImage& result) const {
-    const Kernel kernel(region, deviation_);
+    const Kernel kernel(region, deviation_, options_.falloff);
     float side = 1;
     for (int l = 0; l < n; ++l) side = std::max(side, region.side[l]);
     const size_t last = places_.first[static_cast<size_t>(side)];

@@ -6,8 +6,8 @@
 //     f*_q = f_q^+ d_q / sum_r f_r^+ d_r,
 //
 // sigma and N are those of p, and d_q = max(m / sqrt(2) - distance, 0) is a pyramid that ends at the corners of the
-// square. Growth stops when a pixel has another number of samples than p, or when f*_p falls by less than
-// min_centre_drop; the last accepted region counts.
+// square; the text has M in place of m, and suggests a spline or a Gaussian (Falloff). Growth stops when a pixel has
+// another number of samples than p, or when f*_p falls by less than min_centre_drop; the last accepted region counts.
 //
 // Left open in the paper and chosen here: squares of even side extend one pixel farther to the right and down, so that
 // regions are nested; pixels outside the frame are ignored; a pixel without noise (sigma = 0) or samples (N = 0) stays
@@ -22,12 +22,21 @@
 
 namespace covary {
 
+/// d, the weight of a pixel by its distance from the centre of its region.
+enum class Falloff {
+  kPyramid,   ///< max(m / sqrt(2) - distance, 0), with the side m
+  kCount,     ///< the same with the number M of pixels, as the text of [Csonka2002] has it: nearly flat
+  kSpline,    ///< cubic B-spline that ends at the corners, at m / sqrt(2)
+  kGaussian,  ///< exp(-(2 distance / m)^2), e^-2 at the corners
+};
+
 struct RegionOptions {
   /// Largest side m of a region, 1 … 63; 1: no filter. Default 4 ([Csonka2002] Sec. 6).
   int max_region = 4;
   /// Delta f[0]_min, >= 0: regions grow while the centre's weight falls by at least this much. Default 0.01
   /// ([Csonka2002] Fig. 4).
   float min_centre_drop = 0.01f;
+  Falloff falloff = Falloff::kPyramid;
 };
 
 /// Result of filtering the independent image. One channel each, except `colour`.

@@ -30,7 +30,7 @@ PAIR = [
     *[("--estimator", "cv-baseline", *words.split()) for words in (
         "", "--ridge 0.1", "--k 50 --window 11")],
     *[("--estimator", "iduw", "--samples", "96", *words) for words in ((), ("--window", "7"))],
-    *[("--estimator", "dependent-tests", *words.split()) for words in ("", "--paper")],
+    *[("--estimator", "dependent-tests", *words.split()) for words in ("", "--paper", "--paper --falloff spline")],
 ]
 #: With denoising.
 DENOISED_PAIR = [
