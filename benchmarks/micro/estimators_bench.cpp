@@ -32,16 +32,16 @@ float noise(uint64_t seed, uint64_t a, uint64_t b) {
 }
 
 /// A smooth picture with edges and a textured part; `own`: part of the noise that pixels do not share.
-std::vector<float> make_image(uint64_t seed, float own) {
-  std::vector<float> data(static_cast<size_t>(kWidth) * kHeight * kGroups * 3);
+std::vector<float> make_image(uint64_t seed, float own, int groups = kGroups) {
+  std::vector<float> data(static_cast<size_t>(kWidth) * kHeight * groups * 3);
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x) {
       const uint64_t pixel = 1 + static_cast<uint64_t>(y) * kWidth + x;
       const float texture = y > kHeight / 2 ? noise(1, pixel, 1) : 0.0f;
       const float base =
           ((x / 90 + y / 70) % 2 ? 0.3f : 1.0f) * (1.0f + 0.5f * std::sin(0.02f * x) * std::cos(0.03f * y));
-      for (int i = 0; i < kGroups * 3; ++i)
-        data[(pixel - 1) * kGroups * 3 + i] =
+      for (int i = 0; i < groups * 3; ++i)
+        data[(pixel - 1) * groups * 3 + i] =
             base * (1.0f + 0.5f * texture) * (1.0f + (1.0f - own) * noise(seed, 0, i) + own * noise(seed, pixel, i));
     }
   return data;
@@ -186,6 +186,20 @@ void whole_iicv(benchmark::State& state, const IicvOptions& options) {
   count(state);
 }
 
+/// As published, on one thread: range(0) control variates from windows of side range(1), range(2) groups ([YM2025]
+/// Sec. 4 and Fig. 11).
+void one_published_iicv(benchmark::State& state) {
+  const auto groups = static_cast<int>(state.range(2));
+  const std::vector<float> crn_data = make_image(2, 0.2f, groups), independent_data = make_image(3, 1.0f, groups);
+  const GroupedImage crn{kWidth, kHeight, groups, crn_data.data()};
+  const GroupedImage independent{kWidth, kHeight, groups, independent_data.data()};
+  IicvOptions options = IicvOptions::paper();
+  options.k = static_cast<int>(state.range(0)), options.window = static_cast<int>(state.range(1));
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  for (auto _ : state) benchmark::DoNotOptimize(iicv(crn, independent, options).estimate.data.data());
+  count(state);
+}
+
 /// With its standard error calibrated by both halves of the samples: three runs of the estimator.
 void whole_calibrated(benchmark::State& state) {
   const Input& in = input();
@@ -208,6 +222,16 @@ void whole_iduw(benchmark::State& state) {
   options.samples = 96;
   for (auto _ : state) benchmark::DoNotOptimize(iduw(in.crn, in.independent, options).estimate.data.data());
   count(state);
+}
+
+void one_cv_baseline(benchmark::State& state) {
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  whole_cv_baseline(state);
+}
+
+void one_iduw(benchmark::State& state) {
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  whole_iduw(state);
 }
 
 /// Means and variances as films have them, one group: what the filters of dependent tests read.
@@ -244,6 +268,15 @@ BENCHMARK(one_nl_means)->Arg(1)->Arg(3)->Unit(benchmark::kMillisecond);
 BENCHMARK(one_polynomials)->ArgsProduct({{2, 4, 6}, {48, 192}});
 BENCHMARK_CAPTURE(whole_iicv, default, IicvOptions())->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(whole_iicv, paper, IicvOptions::paper())->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(one_published_iicv)
+    ->Args({6, 11, 12})
+    ->Args({12, 11, 12})
+    ->Args({25, 11, 12})
+    ->Args({50, 21, 12})
+    ->Args({100, 21, 12})
+    ->Args({25, 11, 4})
+    ->Args({25, 11, 24})
+    ->Unit(benchmark::kMillisecond);
 BENCHMARK(whole_calibrated)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(filter_paper)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(filter_exact)->Arg(7)->Arg(15)->Arg(31)->Unit(benchmark::kMillisecond)->UseRealTime();
@@ -254,6 +287,8 @@ BENCHMARK_CAPTURE(whole_dependent_tests, paper, DependentTestsOptions::paper())
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
 BENCHMARK(whole_cv_baseline)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(one_cv_baseline)->Unit(benchmark::kMillisecond);
+BENCHMARK(one_iduw)->Unit(benchmark::kMillisecond);
 BENCHMARK(whole_iduw)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 }  // namespace
