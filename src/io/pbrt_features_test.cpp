@@ -7,9 +7,9 @@
 #include <cmath>
 #include <fstream>
 
-#include "core/arena.h"
 #include "io/load_scene.h"
 #include "support/files.h"
+#include "support/pbrt_scenes.h"
 
 namespace covary::pbrt_features_test {
 namespace {
@@ -17,41 +17,7 @@ namespace {
 using test_support::contains;
 using test_support::message_of;
 
-class PbrtFeatures : public ::testing::Test {
- protected:
-  void write(const std::string& name, const std::string& bytes) {
-    std::ofstream(folder_.file(name), std::ios::binary) << bytes;
-  }
-  LoadedScene load(const std::string& text) {
-    write("scene.pbrt", text);
-    return load_scene(folder_.file("scene.pbrt"));
-  }
-  /// The world, seen by the default camera.
-  LoadedScene world(const std::string& text) { return load("Camera \"perspective\"\nWorldBegin\n" + text); }
-  std::string warnings(const LoadedScene& scene) {
-    std::string all;
-    for (const std::string& warning : scene.warnings) all += warning + "\n";
-    return all;
-  }
-  std::string errors(const std::string& text) {
-    return message_of([&] { load(text); });
-  }
-  /// Where a ray down the z axis meets the scene; -1000 without a hit.
-  static float height(const LoadedScene& scene, float x, float y, float from = 100) {
-    SurfaceHit hit;
-    return scene.scene->intersect({{x, y, from}, {0, 0, -1}}, hit) ? hit.p.z : -1000;
-  }
-  /// Value of the BSDF where that ray hits, for a direction `wi`, over its cosine.
-  static Spectrum brdf(const LoadedScene& scene, float x, float y, const Vec3& wi) {
-    SurfaceHit hit;
-    if (!scene.scene->intersect({{x, y, 100}, {0, 0, -1}}, hit)) return Spectrum(-1);
-    const Vec3 wo = hit.frame.to_local({0, 0, 1}), in = hit.frame.to_local(normalize(wi));
-    Arena arena;
-    return hit.shape->bsdf()->bind(hit, wo.z > 0, TransportMode::kRadiance, arena)->eval(wo, in).value / std::abs(in.z);
-  }
-
-  test_support::TemporaryFolder folder_;
-};
+class PbrtFeatures : public test_support::PbrtScenes {};
 
 /// cameras.cpp: the image plane at distance 1 is the window times tan(fov / 2).
 TEST_F(PbrtFeatures, ScreenWindowsPlaceTheImage) {
@@ -95,99 +61,6 @@ Shape "disk"
 )");
   EXPECT_TRUE(contains(warnings(scene), "MakeNamedMaterial \"odd\" cannot be read; nothing uses it"));
   EXPECT_TRUE(contains(warnings(scene), "Texture \"spectrum\" \"ptex\" cannot be read; nothing uses it"));
-}
-
-/// shapes.h: Sphere, Disk, Cylinder. Meshes of 256 steps around are within 1 - cos(pi / 256) of the surface.
-TEST_F(PbrtFeatures, QuadricsMayBeStretchedAndCut) {
-  constexpr float kNear = 3e-4f;
-  const LoadedScene ellipsoid = world("Scale 1 2 3\nShape \"sphere\"\n");
-  EXPECT_NEAR(height(ellipsoid, 0, 0), 3, 3 * kNear);
-  EXPECT_NEAR(height(ellipsoid, 0.6f, 0), 3 * 0.8f, 3 * kNear);
-  EXPECT_NEAR(height(ellipsoid, 0, 1.2f), 3 * 0.8f, 3 * kNear);
-  EXPECT_EQ(height(ellipsoid, 1.01f, 0), -1000);
-
-  // The band between z = -0.5 and 0, a quarter around: only x, y > 0.
-  const LoadedScene band = world("Shape \"sphere\" \"float zmin\" -0.5 \"float zmax\" 0 \"float phimax\" 90\n");
-  EXPECT_NEAR(height(band, 0.63639610f, 0.63639610f), -std::sqrt(1 - 0.81f), 2 * kNear);
-  EXPECT_EQ(height(band, 0.5f, 0.5f), -1000);  // nearer the pole
-  EXPECT_EQ(height(band, -0.9f, 0), -1000);
-
-  const LoadedScene ring = world("Shape \"disk\" \"float innerradius\" 0.5 \"float height\" 2 \"float phimax\" 180\n");
-  EXPECT_NEAR(height(ring, 0, 0.75f), 2, 1e-6f);
-  EXPECT_EQ(height(ring, 0, 0.4f), -1000);
-  EXPECT_EQ(height(ring, 0, -0.75f), -1000);
-
-  const LoadedScene tube = world("Rotate 90 0 1 0\nScale 1 3 1\nShape \"cylinder\" \"float phimax\" 359.9\n");
-  EXPECT_NEAR(height(tube, 0.5f, 1.8f), 0.8f, kNear);
-}
-
-/// Normals, sides and texture coordinates of the parts.
-TEST_F(PbrtFeatures, PartsHavePbrtsCoordinates) {
-  const LoadedScene scene = world(R"(
-Texture "uv" "spectrum" "bilerp" "rgb v00" [ 0 0 0 ] "rgb v10" [ 1 0 0 ] "rgb v01" [ 0 1 0 ] "rgb v11" [ 1 1 0 ]
-Material "diffuse" "texture reflectance" "uv"
-Shape "sphere" "float zmin" 0 "float phimax" 180
-)");
-  // v = (theta - theta_zmin) / (theta_zmax - theta_zmin), theta_zmin = 90 degrees at z = 0; u = phi / phimax.
-  const float x = 0.3f, y = 0.5f, z = std::sqrt(1 - x * x - y * y);
-  const Spectrum uv = brdf(scene, x, y, {x, y, z}) * kPi;
-  EXPECT_NEAR(uv.r, std::atan2(y, x) / kPi, 2e-3f);
-  EXPECT_NEAR(uv.g, 1 - std::acos(z) / (kPi / 2), 2e-3f);
-  SurfaceHit hit;
-  ASSERT_TRUE(scene.scene->intersect({{x, y, 10}, {0, 0, -1}}, hit));
-  EXPECT_NEAR(dot(hit.frame.n, {x, y, z}), 1, 1e-4f);
-  EXPECT_GT(dot(hit.ng, hit.frame.n), 0.99f);
-  ASSERT_TRUE(
-      world("ReverseOrientation\nShape \"sphere\" \"float zmin\" 0\n").scene->intersect({{x, y, 10}, {0, 0, -1}}, hit));
-}
-
-/// shapes.h: BilinearPatch; p = lerp(v, lerp(u, p00, p10), lerp(u, p01, p11)), here z = x y.
-TEST_F(PbrtFeatures, BentPatchesAreSaddles) {
-  const LoadedScene scene = world("Shape \"bilinearmesh\" \"point3 P\" [ 0 0 0  1 0 0  0 1 0  1 1 1 ]\n");
-  for (const Vec2 at : {Vec2{0.3f, 0.4f}, Vec2{0.9f, 0.8f}, Vec2{0.51f, 0.13f}}) {
-    SurfaceHit hit;
-    ASSERT_TRUE(scene.scene->intersect({{at.x, at.y, 5}, {0, 0, -1}}, hit));
-    EXPECT_NEAR(hit.p.z, at.x * at.y, 5e-4f);
-    EXPECT_NEAR(dot(hit.frame.n, normalize(Vec3{-at.y, -at.x, 1})), 1, 1e-4f);
-  }
-}
-
-/// util/loopsubdiv.cpp, for the octahedron: beta = 3 / 32, the limit of a corner is (1 - 4 gamma) of it with gamma =
-/// 1 / (4 + 3 / (8 beta)) = 1 / 8, however often the mesh is divided before.
-TEST_F(PbrtFeatures, SubdivisionGoesToItsLimit) {
-  for (const int levels : {0, 1, 3}) {
-    const LoadedScene scene = world("Shape \"loopsubdiv\" \"integer levels\" " + std::to_string(levels) + R"(
-  "point3 P" [ 1 0 0  -1 0 0  0 1 0  0 -1 0  0 0 1  0 0 -1 ]
-  "integer indices" [ 0 2 4  2 1 4  1 3 4  3 0 4  2 0 5  1 2 5  3 1 5  0 3 5 ])");
-    EXPECT_NEAR(height(scene, 1e-6f, 0), 0.5f, 1e-5f) << levels;
-    EXPECT_EQ(scene.scene->n_shapes(), 1u);
-  }
-  // A flat square stays flat; its boundary is a curve of its own: the limit of a corner is 3 / 5 of it + 1 / 5 of each
-  // neighbour, of (1, 1) thus (0.6, 0.6).
-  const LoadedScene square = world(R"(
-Shape "loopsubdiv" "integer levels" 0 "point3 P" [ 1 1 2  -1 1 2  -1 -1 2  1 -1 2 ]
-  "integer indices" [ 0 1 2  0 2 3 ])");
-  EXPECT_NEAR(height(square, 0.59f, 0.59f), 2, 1e-6f);
-  EXPECT_EQ(height(square, 0.61f, 0.61f), -1000);
-  EXPECT_TRUE(
-      contains(errors("WorldBegin\nShape \"loopsubdiv\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 0 0 1 0 1 1 ] \"integer "
-                      "indices\" [ 0 1 2 0 1 3 0 1 4 ]"),
-               "is not a manifold"));
-}
-
-/// curves.cpp: a ribbon is as wide as its width, across its tangent and the normal at each of its ends.
-TEST_F(PbrtFeatures, RibbonsLieAcrossTheirNormals) {
-  const LoadedScene scene = world(R"(
-Shape "curve" "string type" "ribbon" "point3 P" [ 0 0 1  1 0 1  2 0 1  3 0 1 ] "normal N" [ 0 0 1  0 0 1 ]
-  "float width0" 0.4 "float width1" 0.8)");
-  for (const float x : {0.5f, 1.5f, 2.5f}) {
-    const float half = (0.4f + 0.4f * x / 3) / 2;
-    EXPECT_NEAR(height(scene, x, 0.98f * half), 1, 1e-5f);
-    EXPECT_EQ(height(scene, x, 1.02f * half), -1000);
-  }
-  EXPECT_TRUE(contains(
-      errors("WorldBegin\nShape \"curve\" \"string type\" \"ribbon\" \"point3 P\" [ 0 0 1  1 0 1  2 0 1  3 0 1 ]"),
-      "has the type 'ribbon' without normals"));
 }
 
 /// lights.cpp: DiffuseAreaLight: L = power / (pi area sides), for each triangle of a mesh.
@@ -241,75 +114,6 @@ TEST_F(PbrtFeatures, ImagesShineInTheirDirections) {
   EXPECT_NEAR(towards(gonio, {0.2f, 1, -0.2f}), 3 * 2, 1e-4f);
   EXPECT_NEAR(towards(gonio, {0.2f, 1, 0.2f}), 5 * 2, 1e-4f);
   EXPECT_NEAR(towards(gonio, {0, -1, 0.1f}), 2, 1e-4f);
-}
-
-/// media.h: GridMedium; util/containers.h: SampledGrid is centred like texels, 0 outside.
-TEST_F(PbrtFeatures, GridsScaleTheirCoefficients) {
-  const LoadedScene scene = world(R"(
-Translate 10 0 0
-MakeNamedMedium "smoke" "string type" "uniformgrid" "integer nx" 2 "float density" [ 1 3 ]
-  "point3 p0" [ 0 0 0 ] "point3 p1" [ 2 1 1 ] "rgb sigma_a" [ 1 2 3 ] "rgb sigma_s" [ 3 2 1 ] "float scale" 0.5
-  "rgb Le" [ 2 4 6 ] "float Lescale" [ 1 10 ]
-MediumInterface "smoke" ""
-Material "interface"
-Shape "sphere" "float radius" 4
-)");
-  SurfaceHit hit;
-  ASSERT_TRUE(scene.scene->intersect({{10, 0, 100}, {0, 0, -1}}, hit));
-  const Medium* smoke = hit.shape->medium_towards(hit.ng, {0, 0, -1});
-  ASSERT_TRUE(smoke);
-  const auto at = [&](float x, float y = 0.5f) { return smoke->at({10 + x, y, 0.5f}); };
-  EXPECT_NEAR(at(0.5f).extinction.g, 0.5f * 4 * 1, 1e-5f);
-  EXPECT_NEAR(at(1.5f).extinction.g, 0.5f * 4 * 3, 1e-5f);
-  EXPECT_NEAR(at(1).extinction.r, 0.5f * 4 * 2, 1e-5f);
-  EXPECT_NEAR(at(1.5f).scattering.b, 0.5f * 1 * 3, 1e-5f);
-  EXPECT_NEAR(at(0).extinction.g, 0.5f * 4 * 0.5f, 1e-5f);  // halfway to the 0 outside
-  EXPECT_EQ(at(-0.1f).extinction.g, 0);
-  EXPECT_EQ(at(0.5f, 1.1f).extinction.g, 0);
-  const Spectrum glow = smoke->emission({11.5f, 0.5f, 0.5f}, at(1.5f));  // Le Lescale sigma_a
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(glow[c], 20 * (c + 1) * 0.5f * (c + 1) * 3, 1e-2f);
-  EXPECT_EQ(warnings(scene).find("glows"), std::string::npos);
-}
-
-TEST_F(PbrtFeatures, MediaHaveNamesAndColoursInEachCell) {
-  const LoadedScene scene = world(R"(
-MakeNamedMedium "milk" "string type" "homogeneous" "string preset" "Wholemilk" "float scale" 2
-MakeNamedMedium "grid" "string type" "rgbgrid" "integer nx" 1 "integer nz" 2 "rgb sigma_a" [ 1 1 1  0 0 2 ]
-  "rgb sigma_s" [ 1 3 0  2 2 2 ]
-MediumInterface "milk" "grid"
-Material "interface"
-Shape "sphere" "float radius" 4
-)");
-  SurfaceHit hit;
-  ASSERT_TRUE(scene.scene->intersect({{0, 0, 100}, {0, 0, -1}}, hit));
-  // [Jensen2001], Fig. 5: whole milk.
-  const auto milk = hit.shape->medium_towards(hit.ng, {0, 0, -1})->at({});
-  EXPECT_NEAR(milk.scattering.r, 2 * 2.55f, 1e-4f);
-  EXPECT_NEAR(milk.extinction.b, 2 * (3.77f + 0.014f), 1e-4f);
-  const auto low = hit.shape->medium_towards(hit.ng, {0, 0, 1})->at({0.5f, 0.5f, 0.25f});
-  EXPECT_NEAR(low.extinction.g, 4, 1e-5f);
-  EXPECT_NEAR(low.scattering.g, 3, 1e-5f);
-}
-
-TEST_F(PbrtFeatures, ObjectsWithMediaAreCopied) {
-  const LoadedScene scene = world(R"(
-MakeNamedMedium "milk" "string type" "homogeneous"
-ObjectBegin "drop"
-MediumInterface "milk" ""
-Material "dielectric"
-Translate 0 0 1
-Shape "sphere"
-ObjectEnd
-Translate 5 0 0
-ObjectInstance "drop"
-Scale 2 2 2
-ObjectInstance "drop"
-)");
-  EXPECT_EQ(scene.scene->n_shapes(), 2u);
-  EXPECT_NEAR(height(scene, 5, 0), 4, 1e-4f);
-  SurfaceHit hit;
-  ASSERT_TRUE(scene.scene->intersect({{5, 0, 100}, {0, 0, -1}}, hit));
-  EXPECT_TRUE(hit.shape->medium_towards(hit.ng, {0, 0, -1}));
 }
 
 TEST_F(PbrtFeatures, AttributesAreDefaults) {
