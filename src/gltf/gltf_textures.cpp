@@ -38,11 +38,12 @@ std::pair<int, int> size_of(std::string_view bytes) {
 
 /// What an image is that is not read.
 std::string unknown_format(std::string_view bytes) {
-  static constexpr const char* kAdvice = "; convert it to PNG, e.g. with gltf-transform";
-  if (bytes.starts_with("\xabKTX")) return fmt::format("is a KTX texture, which is not supported{}", kAdvice);
+  if (bytes.starts_with("\xabKTX"))
+    return "is a KTX 2 texture (Basis Universal), which is not supported; 'gltf-transform ktxdecompress IN OUT' turns "
+           "those of a file into PNG";
   if (is_webp(bytes) && !reads_webp())
     return "is a WebP picture, and covary was built without libwebp-dev; build it with the latter, or convert it";
-  return fmt::format("is not a readable PNG, JPEG or WebP picture{}", kAdvice);
+  return "is not a readable PNG, JPEG or WebP picture; convert it to PNG";
 }
 
 std::string lower(std::string text) {
