@@ -137,6 +137,33 @@ void upgrade_distribution(ObjectDescription& object, Diagnostics& diagnostics) {
   *name = "beckmann";
 }
 
+/// `sky`, `sun` and `sunsky`. In Mitsuba 0.x, y is up, x points east and z south; in Mitsuba 3, z is up, x points south
+/// and y west.
+void upgrade_sky(ObjectDescription& object, Diagnostics& diagnostics) {
+  static const Transform kAxes(Matrix4{{{0, -1, 0, 0}, {0, 0, 1, 0}, {1, 0, 0, 0}, {0, 0, 0, 1}}});
+  if (Property* to_world = find(object, "to_world")) {
+    if (const Transform* placed = std::get_if<Transform>(&to_world->value)) to_world->value = *placed * kAxes;
+  } else {
+    object.properties.push_back({"to_world", kAxes, object.where});
+  }
+  const auto set_default = [&](const char* name, double value) {
+    if (!find(object, name)) object.properties.push_back({name, value, object.where});
+  };
+  const double scale = number(find(object, "scale")).value_or(1);
+  set_default("sun_scale", object.type == "sky" ? 0 : scale);
+  set_default("sky_scale", object.type == "sun" ? 0 : scale);
+  set_default("albedo", 0.15);
+  if (const Property* radius = find(object, "sun_radius_scale"); number(radius))  // 0: parallel light
+    set_default("sun_aperture", std::max(0.5358 * *number(radius), 1e-3));
+  if (number(find(object, "stretch")) == 1.0) remove(object, "stretch");
+  for (const char* name : {"resolution", "scale", "sun_radius_scale"}) remove(object, name);
+  if (object.type != "sky")
+    diagnostics.warn(object.where, fmt::format("the sun of emitter '{}' is that of Mitsuba 3; Mitsuba 0.x has another "
+                                               "model of its colour and brightness",
+                                               object.type));
+  object.type = "sunsky";
+}
+
 void drop(ObjectDescription& object, std::initializer_list<std::string_view> names, Diagnostics& diagnostics) {
   for (std::string_view name : names)
     if (const Property* property = find(object, name)) {
@@ -191,6 +218,8 @@ void upgrade_object(ObjectDescription& object, Diagnostics& diagnostics) {
   } else if (object.kind == "film") {
     upgrade_film(object, diagnostics);
     drop(object, {"attach_log"}, diagnostics);
+  } else if (object.kind == "emitter" && (object.type == "sky" || object.type == "sun" || object.type == "sunsky")) {
+    upgrade_sky(object, diagnostics);
   } else if (object.kind == "rfilter" && object.type == "mitchell") {
     upgrade_mitchell(object);
   } else if (object.kind == "medium" || object.kind == "volume") {

@@ -341,13 +341,13 @@ TEST_F(ForeignScene, UnknownPartsOfTheCameraBecomeTheUsualOnes) {
   write(
       "scene.xml",
       "<scene version=\"3.0.0\"><sensor type=\"codedPerspective\"><float name=\"fov\" value=\"30\"/><film "
-      "type=\"transient_hdr_film\"><integer name=\"width\" value=\"20\"/><integer name=\"temporal_bins\" value=\"9\"/>"
+      "type=\"coded_hdr_film\"><integer name=\"width\" value=\"20\"/><integer name=\"temporal_bins\" value=\"9\"/>"
       "<rfilter type=\"sharp\"/></film><sampler type=\"correlated\"/></sensor></scene>");
   const LoadedScene scene = load_scene(folder_.file("scene.xml"), ignoring());
   EXPECT_EQ(scene.width, 20);
   EXPECT_EQ(scene.camera->settings().fov_degrees, 30);
   EXPECT_EQ(scene.filter.kind, FilterKind::kGaussian);
-  EXPECT_TRUE(contains(warnings(scene), "unknown film 'transient_hdr_film' becomes 'hdrfilm'"));
+  EXPECT_TRUE(contains(warnings(scene), "unknown film 'coded_hdr_film' becomes 'hdrfilm'"));
   write("scene.xml", "<scene version=\"3.0.0\"><sensor type=\"irradiancemeter\"/></scene>");
   EXPECT_TRUE(contains(message_of([&] { load_scene(folder_.file("scene.xml"), ignoring()); }),
                        "sensor 'irradiancemeter' is not supported: it makes no picture"));
