@@ -35,7 +35,7 @@ bool is(const ObjectDescription& object, std::string_view name, const T& expecte
   });
 }
 
-/// Films of light in flight (mitransient, MitsubaToFRenderer, StatMitsuba): the usual picture is the sum over all times.
+/// Films of light in flight (mitransient, MitsubaToFRenderer, StatMitsuba): the usual picture is the sum over time.
 void adopt_film(ObjectDescription& film, SharedWarnings& warnings) {
   if (film.type == "transient_hdr_film") {
     warnings.add(film.where,
