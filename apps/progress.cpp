@@ -56,16 +56,17 @@ void ProgressLine::begin(const std::string& phase, uint64_t done) {
   const std::lock_guard lock(mutex_);
   phase_ = phase, shown_.clear();
   first_ = done_ = done, total_ = 0;
-  expected_ = later_units_ = later_seconds_ = 0;
+  expected_ = nullptr, later_units_ = later_seconds_ = 0;
   of_phase_ = Stopwatch();
   if (quiet_) return;
   if (terminal_) draw();
   if (!redrawing_.joinable()) redrawing_ = std::thread([this] { redraw_regularly(); });
 }
 
-void ProgressLine::expect(double seconds) {
+void ProgressLine::expect(std::function<double()> seconds_left) {
   const std::lock_guard lock(mutex_);
-  expected_ = seconds;
+  expected_ = std::move(seconds_left);
+  if (terminal_ && expected_) draw();
 }
 
 void ProgressLine::later(double units, double seconds) {
@@ -149,7 +150,8 @@ std::string ProgressLine::text(int columns) const {
   const double seconds = of_phase_.seconds();
   std::string text = fmt::format("{}: {}", label_, phase_);
   if (seconds >= 1) text += " " + format_duration(std::floor(seconds));
-  if (expected_ > seconds) text += fmt::format("  {} left", format_duration(all_left(expected_ - seconds)));
+  const double left = expected_ ? expected_() : 0;
+  if (left > 0) text += fmt::format("  {} left", format_duration(all_left(left)));
   return text + note();
 }
 

@@ -3,6 +3,7 @@
 
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -26,9 +27,9 @@ class ProgressLine {
   /// Starts a phase, such as "loading", shown with its seconds until update() reports progress. `done`: where update()
   /// counts on from.
   void begin(const std::string& phase, uint64_t done = 0);
-  /// What begin() was told. Of the phase: the seconds that it will take, if update() does not tell. After it: work that
-  /// takes as long as so many units of update(), and seconds.
-  void expect(double seconds);
+  /// Until the next begin(). Of the phase: a function for the seconds left, if update() does not tell; none are shown if
+  /// it says 0 or less. After the phase: work that takes as long as so many units of update(), and seconds.
+  void expect(std::function<double()> seconds_left);
   void later(double units, double seconds);
   /// All of it follows again so many times, as the frames of a sequence: of `seconds` each, or 0 if unknown.
   void repeats(int times, double seconds);
@@ -67,7 +68,8 @@ class ProgressLine {
   bool drawn_ = false, finished_ = false;
   Stopwatch of_line_, of_phase_, of_limit_;
   double seconds_limit_ = 0, goal_ = 0;
-  double expected_ = 0, later_units_ = 0, later_seconds_ = 0;
+  std::function<double()> expected_;
+  double later_units_ = 0, later_seconds_ = 0;
   int repeats_ = 0;
   double repeat_seconds_ = 0;
   double next_;  // when to draw, seconds of the line

@@ -71,8 +71,7 @@ std::string next_text(const RenderReport& report, const PhaseTimes& times) {
   const RenderOptions& o = report.options;
   const RenderResult& result = report.result;
   if (!missing_network(o.settings.denoising).empty() || o.sequence.is_sequence()) return "";  // it is said
-  if (result.of_time)
-    return fmt::format("`{}` instead of --time makes the same image", result.of_time->text());
+  if (result.of_time) return fmt::format("`{}` instead of --time makes the same image", result.of_time->text());
   if (times.auxiliary + times.estimate > kMostTime * times.total() && times.total() > kLongSeconds)
     return "more samples cost little here: most of the time is the same for any number";
   if (!o.request().passes.empty())
@@ -141,7 +140,8 @@ void print_frame(const RenderReport& report, const std::string& frame) {
 
 void print_frames(const RenderOptions& options, int n_frames, const PhaseTimes& times) {
   const std::string& output = options.request().output;
-  fmt::print(stderr, "{}: {} frames\ntime: {}\n", output, n_frames, text_of(times, estimate_name(options)));
+  fmt::print(stderr, "{}: {} frame{}\ntime: {}\n", output, n_frames, n_frames > 1 ? "s" : "",
+             text_of(times, estimate_name(options)));
   if (n_frames > 1)
     fmt::print(stderr, "next: `covary convert {} {}` makes a video\n", shell_text({output}), "video.mp4");
 }

@@ -66,7 +66,7 @@ void VideoWriter::start(int width, int height) {
                                           "-y",
                                           temporary_});
   std::signal(SIGPIPE, SIG_IGN);  // reported as a write error if ffmpeg ends early
-  pipe_ = popen(command.c_str(), "w");
+  pipe_ = popen(("command -v ffmpeg > /dev/null || exit 127; " + command).c_str(), "w");  // without the shell's words
   if (!pipe_) throw Error(ErrorCode::kIo, "cannot start ffmpeg");
 }
 

@@ -3,6 +3,8 @@
 
 #include <sys/resource.h>
 
+#include <algorithm>
+
 namespace covary {
 
 /// Processor time of a process, of all its threads, in user and kernel mode; RUSAGE_SELF or that of a child.
@@ -18,6 +20,15 @@ inline double processor_seconds() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return processor_seconds(usage);
+}
+
+/// How long work takes that needs `needed` seconds of processor time on `threads` processors: as long as alone,
+/// times how much longer such work took before, which got `processor` seconds within `clock` seconds, because other
+/// programs have the processors, too. A tenth of a second of the clock or less tells nothing.
+inline double clock_seconds(double needed, double threads, double processor, double clock) {
+  constexpr double kTells = 0.1, kLeastShare = 0.01;
+  const double share = clock > kTells ? std::clamp(processor / (clock * threads), kLeastShare, 1.0) : 1;
+  return needed / (threads * share);
 }
 
 }  // namespace covary

@@ -255,6 +255,33 @@ TEST(CompareCells, RatiosAreAgainstTheBaselineWithTheSameBudget) {
   EXPECT_EQ(results.summaries[1].equal_time.high, first.equal_time.high);
 }
 
+/// One of both methods got fewer processors than it asked for.
+TEST(CompareCells, WarnWhereClockAndProcessorDisagree) {
+  const auto compared = [](double processor) {
+    Results results = two_methods({0.3, 0.36, 0.3}, {0.1, 0.12, 0.1});
+    for (Cell& cell : results.cells) {
+      const bool is_base = cell.method == 0;
+      for (RunResult& run : cell.runs) run.record.processor_seconds = is_base ? 2 : processor;
+      cell.method_seconds.value = is_base ? 1 : 3;
+      cell.processor_seconds.value = is_base ? 2 : processor;
+    }
+    compare_cells(results);
+    return results;
+  };
+  EXPECT_TRUE(compared(6).warnings.empty()) << "three times as long by both";
+  EXPECT_TRUE(compared(5).warnings.empty()) << "by less than a factor of 1.3";
+  EXPECT_TRUE(compared(0).warnings.empty()) << "processor time is unknown";
+  EXPECT_EQ(compared(9).warnings.size(), 2u) << "the baseline was disturbed";
+  const Results busy = compared(3);
+  ASSERT_EQ(busy.warnings.size(), 2u) << "for each budget";
+  EXPECT_EQ(busy.warnings[0],
+            "room, iicv, 24 spp: by the clock it took 3 times the time of pt, but 1.5 times its processor time: the "
+            "machine was busy with other work, or one of both uses fewer threads; at equal processor time the ratio of "
+            "errors is 2, at equal time 1");
+  EXPECT_NEAR(busy.find(0, 1, 0)->equal_processor_time.value, 2, 1e-9);
+  EXPECT_NEAR(busy.find(0, 1, 0)->equal_time.value, 1, 1e-9);
+}
+
 /// 48 samples against the baseline's 32: a third of the error is a half at equal samples.
 TEST(CompareCells, OtherNumbersOfSamplesAreNormalised) {
   Results results = two_methods({0.3, 0.36, 0.3}, {0.1, 0.12, 0.1});

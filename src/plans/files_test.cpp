@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <array>
-#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -29,111 +28,6 @@ using test_support::message_of;
 using test_support::TemporaryFolder;
 
 const std::string kRoom = std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml";
-
-std::string attribute(const std::string& path, const std::string& name) {
-  const ImageInfo info = inspect_image(path);
-  for (const auto& [key, value] : info.attributes)
-    if (key == "covary:" + name) return value;
-  return "none";
-}
-
-TEST(Interrupted, AnImageOfAllSamplesSoFar) {
-  const LoadedScene scene = load_sized(kRoom);
-  const TemporaryFolder folder;
-  RenderRequest request = request_of(96);
-  request.output = folder.file("a.exr");
-  request.preview = true;
-  StopAfter old_enough(40);  // 12 tiles are one wave of one pass
-  RenderResult result = render(scene, average_plan(), request, old_enough.callbacks);
-  ASSERT_TRUE(result.interrupted);
-  EXPECT_EQ(attribute(request.output, "complete"), "false");
-  EXPECT_EQ(attribute(request.output, "estimator"), "average");
-  EXPECT_EQ(read_image(request.output).image.data, result.image.estimate.data);
-  EXPECT_TRUE(fs::exists(folder.file("a.png")));
-  EXPECT_TRUE(fs::exists(folder.file("a.passes/crn.exr")));
-}
-
-TEST(Interrupted, TheMeanWhereFilmsAreTooYoungForTheEstimator) {
-  const LoadedScene scene = load_sized(kRoom);
-  const TemporaryFolder folder;
-  RenderRequest request = request_of(96);
-  request.output = folder.file("a.exr");
-  StopAfter young(3);  // of 12 tiles of the first wave
-  const RenderResult result = render(scene, average_plan(), request, young.callbacks);
-  ASSERT_TRUE(result.interrupted);
-  EXPECT_TRUE(result.image.estimate.data.empty());
-  EXPECT_EQ(attribute(request.output, "estimator"), "none");
-  const Image image = read_image(request.output).image;
-  const Film& film = result.passes[0].film;
-  int seen = 0;
-  for (int y = 0; y < 30; ++y)
-    for (int x = 0; x < 40; ++x) {
-      seen += film.count(x, y) > 0;
-      ASSERT_EQ(image.rgb(x, y), film.mean(x, y)) << "the second pass has no samples, and takes no part";
-    }
-  EXPECT_GT(seen, 0);
-}
-
-TEST(Interrupted, NothingIsWrittenBeforeTheFirstSample) {
-  const LoadedScene scene = load_sized(kRoom);
-  const TemporaryFolder folder;
-  RenderRequest request = request_of(96);
-  request.output = folder.file("a.exr");
-  request.aovs = true;
-  StopAfter at_once(0);
-  at_once.stop = true;
-  const RenderResult result = render(scene, average_plan(), request, at_once.callbacks);
-  EXPECT_TRUE(result.interrupted);
-  EXPECT_EQ(result.kept, "");
-  EXPECT_TRUE(fs::is_empty(folder.path()));
-}
-
-TEST(Interrupted, AFilmThatIsTheOutputSaysThatItIsNotComplete) {
-  const LoadedScene scene = load_sized(kRoom);
-  const TemporaryFolder folder;
-  RenderRequest request = request_of(96);
-  request.output = folder.file("a.exr");
-  request.aovs = true;
-  StopAfter stop(30 + 20);  // rows of the auxiliary images, and tiles
-  const RenderResult result = render(scene, plain_plan(Sampling::kIndependent), request, stop.callbacks);
-  ASSERT_TRUE(result.interrupted);
-  EXPECT_EQ(result.kept, request.output);
-  EXPECT_EQ(read_film_attributes(request.output).at("complete"), "false");
-  EXPECT_EQ(read_film(request.output).aovs.size(), std::size(kAuxiliaryImages));
-  request.resume = true;
-  EXPECT_TRUE(render(scene, plain_plan(Sampling::kIndependent), request).complete);
-  EXPECT_EQ(read_film_attributes(request.output).at("complete"), "true");
-}
-
-TEST(AuxiliaryImages, AreTimedAsRenderingAndEndWithTheRender) {
-  const LoadedScene scene = load_sized(kRoom);
-  RenderRequest request = request_of(12);
-  request.aovs = true;
-  RenderResult result = render(scene, average_plan(), request);
-  EXPECT_GT(result.seconds.auxiliary, 0);
-  EXPECT_GE(result.render_seconds(), result.seconds.auxiliary + result.passes[0].result.seconds);
-  EXPECT_EQ(result.aovs.size(), std::size(kAuxiliaryImages));
-  EXPECT_TRUE(result.passes[1].film.aovs.empty());
-  request.seconds = 1e-6;
-  request.spp.reset();
-  const RenderResult timed = render(scene, plain_plan(Sampling::kIndependent), request);
-  EXPECT_GE(timed.seconds.limited, timed.seconds.auxiliary);
-  EXPECT_EQ(timed.passes[0].film.mean_count(), 1)
-      << "no time was left after the auxiliary images and the first samples";
-}
-
-TEST(AuxiliaryImages, EndAtOnceWhenStopped) {
-  const LoadedScene scene = load_sized(kRoom);
-  PassSettings settings;
-  settings.filter = scene.filter;
-  Film film(40, 30, {0, 0, 40, 30}, 1);
-  std::atomic<bool> stop{true};
-  render_aovs(*scene.scene, settings, 4, film, &stop);
-  EXPECT_TRUE(film.aovs.empty());
-  stop = false;
-  render_aovs(*scene.scene, settings, 4, film, &stop);
-  EXPECT_EQ(film.aovs.size(), std::size(kAuxiliaryImages));
-}
 
 TEST(Passes, FilmsThatAreThereAreNeitherUsedNorReplacedUnasked) {
   const LoadedScene scene = load_sized(kRoom);
@@ -263,7 +157,7 @@ TEST(Failure, FilmsOfAFolderAreThereBeforeTheEstimate) {
   plan.estimate = [&, make = plan.estimate](std::span<const Pass> passes, int row, int n_rows, const Beside& beside) {
     for (const char* name : {"films/crn.exr", "films/independent.exr"}) {
       EXPECT_EQ(read_film(folder.file(name)).mean_count(), 12) << name;
-      EXPECT_EQ(attribute(folder.file(name), "complete"), "true") << name;
+      EXPECT_EQ(attribute_of(folder.file(name), "complete"), "true") << name;
     }
     return make(passes, row, n_rows, beside);
   };
@@ -309,7 +203,7 @@ TEST(Failure, FilmsOfFailedPathLengthsAreKept) {
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_TRUE(contains(warnings[0], "the film is kept in '" + request.output + "'; `resume` continues"));
   EXPECT_EQ(read_film(request.output).mean_count(), 24);
-  EXPECT_EQ(attribute(request.output, "complete"), "false");
+  EXPECT_EQ(attribute_of(request.output, "complete"), "false");
 }
 
 TEST(Failure, FilmsOfAnImageThatCannotBeWrittenAreKept) {

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "core/error.h"
@@ -16,7 +17,6 @@
 #include "plans/light_plan.h"
 #include "plans/memory.h"
 #include "plans/pass_files.h"
-#include "plans/pass_waves.h"
 #include "plans/training_stage.h"
 
 namespace covary {
@@ -171,13 +171,16 @@ bool PlanRun::render_phase(size_t index, double share) {
   if (index == first_of_phase_.size()) begin_phase(phase);
   const std::span<Pass> passes = passes_of(index);
   if (passes.empty()) return false;  // interrupted before its films were created
-  if (index + 1 == plan_.phases.size() && needs_aovs() && result_.aovs.empty()) render_auxiliary_images();
-  state_.guides = guides();
-  if (timed() && !in_rounds()) state_.seconds_left = seconds_left(index, share);
   if (request_.until > 0) {
     state_.budget = rounds_.budget();  // an earlier call's film may have recorded it
     for (Pass& pass : state_.passes) pass.film.attributes[film_key::kBudgets] = rounds_.text();
   }
+  if (lacks_auxiliary_images(index)) {
+    take_first_samples(passes[0]);
+    if (!stopped()) render_auxiliary_images();
+  }
+  state_.guides = guides();
+  if (timed() && !in_rounds()) state_.seconds_left = seconds_left(index, share);
   set_targets(phase, passes.first(camera_passes(passes).size()));
   if (passes.back().plan.light) set_light_target(*state_.integrator, camera_passes(state_.passes), passes.back());
   for (Pass& pass : passes) pass.count = pass.settings.spp.reached(pass.film);
@@ -185,12 +188,31 @@ bool PlanRun::render_phase(size_t index, double share) {
   begin(RenderStage::kRendering);
   WaveLimits limits;
   if (timed() && !in_rounds()) limits.seconds_left = [this, index, share] { return seconds_left(index, share); };
-  limits.stop = callbacks_.stop;
   const uint64_t later = in_rounds() ? uint64_t{largest_budget(scene_, request_) - state_.budget} * n_pixels() : 0;
   if (callbacks_.progress)
     limits.progress = [this, later](uint64_t done, uint64_t total) {
       callbacks_.progress(done_ + done, done_ + total + later);
     };
+  trace(passes, limits);
+  return !stopped() || complete();
+}
+
+/// So that an interrupted render has a picture, even if auxiliary images take long.
+void PlanRun::take_first_samples(Pass& pass) {
+  if (camera_samples() > 0 || pass.settings.estimate) return;  // such a pass takes all samples of a pixel at once
+  // If the time ends before the next ones, rounds have a sample for each group, and other passes need it.
+  pass.settings.spp = timed() && !in_rounds() ? static_cast<uint32_t>(pass.film.groups()) : 1;
+  pass.count = 0;
+  begin(RenderStage::kRendering);
+  WaveLimits limits;
+  const uint64_t all = n_pixels() * (timed() ? largest_budget(scene_, request_) : state_.budget);
+  if (callbacks_.progress)
+    limits.progress = [this, all](uint64_t done, uint64_t total) { callbacks_.progress(done, std::max(all, total)); };
+  trace(std::span(&pass, 1), limits);
+}
+
+void PlanRun::trace(std::span<Pass> passes, WaveLimits& limits) {
+  limits.stop = callbacks_.stop;
   limits.wave = [this] { between_waves(); };
   limits.small_waves = callbacks_.small_waves && !timed();  // time must not end before each group has a sample
   limits.region = callbacks_.region;
@@ -202,7 +224,6 @@ bool PlanRun::render_phase(size_t index, double share) {
   consistent_ = true;
   done_ += taken;
   unsaved_ = unsaved_ || taken > 0;
-  return !stopped() || complete();
 }
 
 void PlanRun::set_targets(const Phase& phase, std::span<Pass> passes) {

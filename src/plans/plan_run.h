@@ -11,6 +11,7 @@
 
 #include "core/stopwatch.h"
 #include "plans/budget.h"
+#include "plans/pass_waves.h"
 #include "plans/render.h"
 #include "plans/time_budget.h"
 
@@ -30,6 +31,8 @@ class PlanRun {
   /// Renders a phase, until `share` of the time limit is used. False if interrupted.
   bool render_phase(size_t index, double share);
   double seconds_left(size_t phase, double share);
+  void take_first_samples(Pass& pass);
+  void trace(std::span<Pass> passes, WaveLimits& limits);
   /// Measures what the parts of the render take, warns if even the least takes too long, and sets the first budget.
   void plan_time_limit();
   void warn_of_long_training() const;
@@ -58,6 +61,9 @@ class PlanRun {
   void warn_of_other_sampler() const;
   bool estimate();
   bool wants_more();
+  bool lacks_auxiliary_images(size_t phase) const {
+    return phase + 1 == plan_.phases.size() && needs_aovs() && result_.aovs.empty();
+  }
   void render_auxiliary_images();
   void trace_layers();
   void add_path_lengths();

@@ -106,7 +106,9 @@ class Video(CliTest):
         for path in (self.path / "f_03.exr", self.path / "bin/ffmpeg"):
             path.unlink()
         self.environment["PATH"] = f"{self.path}/bin:/nowhere"
-        self.assertIn("videos need the program ffmpeg", self.convert("f_##.exr", "v.mp4").stderr)
+        errors = self.convert("f_##.exr", "v.mp4").stderr
+        self.assertEqual(errors, "covary: videos need the program ffmpeg, which is not installed (Debian: apt install "
+                                 "ffmpeg)\n")
         self.assertEqual([p.name for p in self.path.glob("*v.mp4")], [])
 
     def test_wrong_input(self):

@@ -6,10 +6,13 @@ import random
 import re
 import signal
 import subprocess
+import sys
 import time
 import unittest
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
+import terminal  # noqa: E402
 from cli_test import COVARY, SLOWDOWN, CliTest
 from exr_reader import read_exr
 from exr_writer import film
@@ -72,6 +75,24 @@ class WhileDenoising(CliTest):
                                            env={**os.environ, "STAND_IN_BEGINS": str(begins)})
                 self.assertIn("interrupted", interrupted_when(self, process, begins.exists))
                 begins.unlink()
+
+
+class DuringAuxiliaryImages(CliTest):
+    """They come after the first samples, so that there is a picture."""
+
+    def test_a_picture_is_left(self):
+        room = str(Path(os.environ["SCENES"]) / "room.xml")
+        pid, shown = terminal.start(self, (COVARY, "render", room, "--resolution", "480x320", "--spp", "16", "--oidn",
+                                           "off", "--no-preview", "-o", "a.exr"), self.path)
+        text = b""
+        while b"auxiliary images" not in text:
+            text += os.read(shown, 4096)
+        os.kill(pid, signal.SIGINT)
+        rest, exit_code = terminal.finish(pid, shown)
+        self.assertEqual(exit_code, 130, rest)
+        self.assertIn("'a.exr' is the image so far", rest)
+        values = read_exr((self.path / "a.exr").read_bytes())
+        self.assertGreater(sum(values["G"]), 0)
 
 
 class AtRandomTimes(CliTest):

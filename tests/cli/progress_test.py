@@ -53,6 +53,15 @@ class Progress(CliTest):
         self.in_order(text, "frame 2 (1 of 3): samples", "frame 2 (1 of 3): f_2.exr in ", "frame 4 (3 of 3): samples",
                       "f_#.exr: 3 frames", "\ntime: ", "\nnext: `covary convert 'f_#.exr' video.mp4` makes a video")
 
+    def test_the_time_left_counts_on_the_processors_that_are_to_be_had(self):
+        """Eight threads on one processor: denoising takes as long by the clock as processor time, and not an eighth."""
+        processors = os.sched_getaffinity(0)
+        os.sched_setaffinity(0, {min(processors)})
+        self.addCleanup(os.sched_setaffinity, 0, processors)
+        text = self.shown(*RENDER[:2], "--resolution", "640x400", "--spp", "2", "--no-preview", "--oidn", "off",
+                          "--threads", "8", "-o", "a.exr")
+        self.assertGreaterEqual(int(re.search(r"room: denoising  0:(\d\d) left", text)[1]), 2, text)
+
     def test_the_error_that_is_reached_is_shown_with_its_bounds(self):
         text = self.shown(*RENDER, "--estimator", "iicv", "--until", "relmse=0.0015", "-o", "a.exr", columns=120)
         self.in_order(text, "samples", "  goal relMSE 0.0015", "combining", "samples  relMSE ", ", goal 0.0015",

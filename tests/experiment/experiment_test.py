@@ -453,6 +453,17 @@ class Programs(ExperimentTest):
         self.bad(2, "--renderer 'mine' is the name of a --program, too", "--program", "mine=true", "--renderer",
                  "mine=true")
 
+    def test_a_program_that_waits_is_told(self):
+        """It takes a thousand seconds by the clock, and hardly any of the processor."""
+        results = self.results("--program", 'mine=cp "$COVARY_IMAGE" "$COVARY_OUTPUT"; echo seconds 1000; '
+                                            'echo processor_seconds 1e-3')
+        told = [text for text in results["warnings"] if text.startswith("room, copy, 16 spp: by the clock it took ")]
+        self.assertEqual(len(told), 1, results["warnings"])
+        self.assertIn(" times its processor time: the machine was busy with other work, or ", told[0])
+        copy = next(cell for cell in results["cells"] if cell["method"] == "copy")
+        self.assertLess(copy["equal_time"]["value"], 0.1)
+        self.assertGreater(copy["equal_processor_time"]["value"], 0.1)
+
     def test_mistakes(self):
         self.bad(2, "method 'copy' is made by a program of your own: give --program mine=COMMAND")
         self.bad(2, "--program 'mine': expected NAME=COMMAND", "--program", "mine")

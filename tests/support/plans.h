@@ -6,6 +6,7 @@
 #include <cstring>
 #include <string>
 
+#include "film/image_file.h"
 #include "plans/estimator_plans.h"
 #include "plans/integrator_choice.h"
 #include "plans/render.h"
@@ -57,6 +58,13 @@ struct StopAfter {
   std::atomic<int> left;
   RenderCallbacks callbacks;
 };
+
+/// The attribute covary:NAME of an image file, or "none".
+inline std::string attribute_of(const std::string& path, const std::string& name) {
+  for (const auto& [key, value] : inspect_image(path).attributes)
+    if (key == "covary:" + name) return value;
+  return "none";
+}
 
 inline bool same_bits(const Film& a, const Film& b) {
   return a.counts() == b.counts() && a.data().size() == b.data().size() &&
