@@ -68,8 +68,9 @@ void adopt_forms_of_forks(ObjectDescription& object, bool old, SharedWarnings& w
   constexpr const char* kSmooth = "this model is smooth, and Mitsuba 0.x does not read it either";
   if (object.kind == "film") {
     adopt_film(object, warnings);
+    if (old && object.type == "hdrfilm") drop(object, {"gamma"}, "the film is linear", warnings);
   } else if (object.kind == "bsdf") {
-    drop(object, {"sdmm_filename"}, kSampling, warnings);
+    drop(object, {"sdmm_filename", "use_path_guiding"}, kSampling, warnings);
     const bool smooth = contains({"conductor", "dielectric", "plastic", "thindielectric"}, object.type);
     if (old && smooth) drop(object, {"alpha", "distribution"}, kSmooth, warnings);
   } else if (object.kind == "medium") {

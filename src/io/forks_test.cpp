@@ -58,7 +58,8 @@ TEST_F(Forks, IntegratorsWithTheSamePictureAreRead) {
                                                 {"photonmap", "0.6.0", "path"},
                                                 {"prbvolpath", "3.0.0", "path"},
                                                 {"direct_projective", "3.0.0", "direct"},
-                                                {"sdmm", "0.6.0", "path"}}) {
+                                                {"sdmm", "0.6.0", "path"},
+                                                {"recursive_path", "0.6.0", "path"}}) {
     const bool old = version[0] == '0';
     const LoadedScene scene =
         load(kCamera + fmt::format("<integrator type=\"{}\"><integer name=\"{}\" value=\"7\"/><integer name=\"{}\" "
@@ -137,6 +138,10 @@ TEST_F(Forks, ParametersOfSamplingAreToldOnce) {
   EXPECT_TRUE(contains(warnings(load(kCamera + smooth, "0.6.0")),
                        "parameter 'alpha' of bsdf 'dielectric' is ignored: this model is smooth, and Mitsuba 0.x"));
   EXPECT_TRUE(contains(errors(kCamera + smooth), "unknown parameter 'alpha' of bsdf 'dielectric'"));
+  EXPECT_TRUE(contains(warnings(load("<sensor type=\"perspective\"><film type=\"hdrfilm\"><float name=\"gamma\" "
+                                     "value=\"2.2\"/></film></sensor>",
+                                     "0.6.0")),
+                       "parameter 'gamma' of film 'hdrfilm' is ignored: the film is linear"));
   const std::string stray = "<integer name=\"maxDepth\" value=\"2\"/>";
   EXPECT_TRUE(contains(warnings(load(kCamera + stray, "0.6.0")), "parameter 'max_depth' of <scene> is ignored"));
   EXPECT_TRUE(contains(errors(kCamera + stray), "unknown parameter 'maxDepth' of <scene>"));

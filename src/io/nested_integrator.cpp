@@ -55,10 +55,11 @@ constexpr std::pair<std::string_view, const char*> kSamePicture[] = {
     {"pssmlt", "path"},
     {"sppm", "path"},
     {"volpath_simple", "path"},
-    // forks: path guiding, gradient-domain rendering, vertex connection and merging, light in flight
+    // forks: path guiding, splitting and roulette, gradient-domain rendering, vertex connection, light in flight
     {"gbdpt", "path"},
     {"gpt", "path"},
     {"guided_path", "path"},
+    {"recursive_path", "path"},
     {"sdmm", "path"},
     {"transient_path", "path"},
     {"transient_prbvolpath", "path"},
