@@ -50,11 +50,9 @@ std::string part_name(const Part& part) {
   return part.of == 0 ? "" : fmt::format("{}-of-{}", part.number + 1, part.of);
 }
 
-std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
-
 /// The error message of a command, without the command's name in front.
 std::string complaint(const std::string& message) {
-  const std::string line = first_line(message), name = "covary: ";
+  const std::string line = telling_line(message), name = "covary: ";
   return line.starts_with(name) ? line.substr(name.size()) : line;
 }
 
@@ -373,7 +371,7 @@ class Experiment {
     while (!failure.message.empty() && failure.message.back() == '\n') failure.message.pop_back();
     report(Progress::Kind::kFailed,
            fmt::format("{}{}{}: {}", failure.scene, failure.method.empty() ? "" : ", " + failure.method,
-                       failure.budget.empty() ? "" : ", " + failure.budget, first_line(failure.message)));
+                       failure.budget.empty() ? "" : ", " + failure.budget, telling_line(failure.message)));
     results_.failures.push_back(std::move(failure));
   }
 

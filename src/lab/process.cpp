@@ -140,4 +140,11 @@ ProcessResult run_process(const std::vector<std::string>& command, const std::at
   return result;
 }
 
+std::string telling_line(const std::string& errors) {
+  const size_t last = errors.find_last_not_of('\n');
+  if (!errors.starts_with("Traceback") || last == std::string::npos) return errors.substr(0, errors.find('\n'));
+  const size_t begin = errors.rfind('\n', last) + 1;
+  return errors.substr(begin, last + 1 - begin);
+}
+
 }  // namespace covary::lab

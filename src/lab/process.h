@@ -26,4 +26,7 @@ struct ProcessResult {
 ProcessResult run_process(const std::vector<std::string>& command, const std::atomic<bool>* stop = nullptr,
                           const std::vector<std::string>& environment = {});
 
+/// The line of a program's messages that says what is wrong: the first or, of a traceback of Python, the last.
+std::string telling_line(const std::string& errors);
+
 }  // namespace covary::lab

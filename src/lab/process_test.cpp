@@ -72,6 +72,14 @@ TEST(Process, IsInterruptedFromTheFirstMomentOn) {
   std::signal(SIGINT, before);
 }
 
+TEST(TellingLine, IsTheFirstOrTheLastOfATraceback) {
+  EXPECT_EQ(telling_line(""), "");
+  EXPECT_EQ(telling_line("covary: no such file\nmore"), "covary: no such file");
+  EXPECT_EQ(telling_line("Traceback (most recent call last):\n  File \"a.py\", line 1\nKeyError: 'x'\n"),
+            "KeyError: 'x'");
+  EXPECT_EQ(telling_line("Traceback"), "Traceback");
+}
+
 TEST(Process, HasNothingToRead) { EXPECT_EQ(shell("cat; echo end").output, "end\n"); }
 
 TEST(Process, InterruptsTheChildWhenToldToStop) {

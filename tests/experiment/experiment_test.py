@@ -470,6 +470,8 @@ class Programs(ExperimentTest):
         self.bad(2, "--program 'mine' is given twice", "--program", "mine=true", "--program", "mine=true")
         failed = self.results("--program", "mine=echo no idea >&2; exit 3", code=1)["failures"]
         self.assertEqual([(f["method"], f["exit_code"], f["message"]) for f in failed], [("copy", 3, "no idea")])
+        self.results("--program", "mine=python3 -c 'd = {}; d[5]'", code=1)
+        self.assertIn("failed: room, copy, 16 spp: KeyError: 5\n", self.stderr)
         failed = self.results("--program", "mine=true", code=1)["failures"]
         self.assertIn("without writing the image that COVARY_OUTPUT names", failed[0]["message"])
         self.suite["scenes"][0]["frames"] = "1-2"
