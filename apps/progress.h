@@ -27,8 +27,8 @@ class ProgressLine {
   /// Starts a phase, such as "loading", shown with its seconds until update() reports progress. `done`: where update()
   /// counts on from.
   void begin(const std::string& phase, uint64_t done = 0);
-  /// Until the next begin(). Of the phase: a function for the seconds left, if update() does not tell; none are shown if
-  /// it says 0 or less. After the phase: work that takes as long as so many units of update(), and seconds.
+  /// Until the next begin(). Of the phase: a function for the seconds left, if update() does not tell; none are shown
+  /// if it says 0 or less. After the phase: work that takes as long as so many units of update(), and seconds.
   void expect(std::function<double()> seconds_left);
   void later(double units, double seconds);
   /// All of it follows again so many times, as the frames of a sequence: of `seconds` each, or 0 if unknown.
