@@ -144,8 +144,9 @@ class Render(PackageTest):
         """A function of three arguments hears of each phase, from the first; others of samples alone."""
         seen, counted = [], []
         covary.render(self.scene(), spp=24, oidn="off", progress=lambda done, total, phase: seen.append(phase))
-        phases = list(dict.fromkeys(seen))
-        self.assertEqual([p for p in ("auxiliary images", "samples", "denoising", "writing") if p in phases], phases)
+        phases = [phase for phase, before in zip(seen, ["", *seen]) if phase != before]
+        known = iter(("samples", "auxiliary images", "samples", "denoising", "writing"))
+        self.assertTrue(all(phase in known for phase in phases), phases)  # in this order; short ones may not be heard of
         self.assertEqual(phases[-1], "writing")
         covary.render(self.scene(), spp=24, oidn="off", progress=lambda done, total: counted.append(total))
         self.assertLessEqual(set(counted), {24 * SIZE[0] * SIZE[1]})
