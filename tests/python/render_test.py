@@ -146,7 +146,7 @@ class Render(PackageTest):
         covary.render(self.scene(), spp=24, oidn="off", progress=lambda done, total, phase: seen.append(phase))
         phases = [phase for phase, before in zip(seen, ["", *seen]) if phase != before]
         known = iter(("samples", "auxiliary images", "samples", "denoising", "writing"))
-        self.assertTrue(all(phase in known for phase in phases), phases)  # in this order; short ones may not be heard of
+        self.assertTrue(all(phase in known for phase in phases), phases)  # in order; short ones may be missed
         self.assertEqual(phases[-1], "writing")
         covary.render(self.scene(), spp=24, oidn="off", progress=lambda done, total: counted.append(total))
         self.assertLessEqual(set(counted), {24 * SIZE[0] * SIZE[1]})
