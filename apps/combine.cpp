@@ -32,13 +32,13 @@
 #include "frame_files.h"
 #include "guide_layer.h"
 #include "json_output.h"
+#include "method_options.h"
 #include "metrics/provenance.h"
 #include "numbers.h"
 #include "picture_options.h"
 #include "progress.h"
 #include "risk_report.h"
 #include "sequences/frame_names.h"
-#include "settings/option_names.h"
 #include "stages.h"
 #include "value_names.h"
 
@@ -353,7 +353,7 @@ void add_combine(CLI::App& app) {
     return std::find(std::begin(kAdaptiveOptions), std::end(kAdaptiveOptions), option.name) !=
            std::end(kAdaptiveOptions);
   });
-  add_options(*command, of_estimator, o->of_estimator);
+  add_method_options(*command, {{of_estimator, &o->of_estimator}});
   add_value(*command, "--view", o->view, "NAME", "View (eye) of stereo files");
   add_stages_option(*command, o->stages);
   add_threads_option(*command, o->threads);

@@ -44,6 +44,9 @@ std::vector<std::string> groups_of(const CommandDescription& command);
 /// The help of a command, in lines of at most 100 columns; without `all`, only kBasicOptions.
 std::string help_text(const CLI::App& app, const std::string& name, bool all);
 
+/// A line of a help: `text` next to its term, wrapped; below it if the term is long.
+std::string help_entry(const std::string& term, const std::string& text);
+
 /// A man page (section 1), in man(7) macros.
 std::string man_page(const CLI::App& app, const std::string& version);
 

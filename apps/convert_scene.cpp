@@ -13,8 +13,8 @@
 #include "film/output_file.h"
 #include "film/outputs.h"
 #include "formats/file_resolver.h"
+#include "method_options.h"
 #include "plans/integrator_choice.h"
-#include "settings/option_names.h"
 #include "value_names.h"
 
 namespace covary {
@@ -83,7 +83,7 @@ void convert_scene(const ConvertSceneOptions& options) {
                 fmt::format("the scene has meshes or images in its own file, which become files beside the new one: "
                             "the output '{}' must be the name of a file",
                             options.output));
-  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));
+  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_options(warning));
   write_files(options, scene);
 }
 

@@ -7,7 +7,7 @@
 #include "command_description.h"
 #include "core/error.h"
 #include "io/load_scene.h"
-#include "settings/option_names.h"
+#include "method_options.h"
 #include "value_names.h"
 
 namespace covary {
@@ -42,7 +42,7 @@ CLI::Validator checked(const Option& option) {
 }
 
 void add_option(CLI::App& command, const Option& what, OptionValues& values) {
-  const std::string names = names_of(what), help = as_flags(help_with_default(what));
+  const std::string names = names_of(what), help = as_options(help_with_default(what));
   CLI::Option* option = nullptr;
   if (what.type == Option::Type::kFlag) {
     option = command.add_flag_callback(

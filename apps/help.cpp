@@ -6,6 +6,7 @@
 #include "command_description.h"
 #include "commands.h"
 #include "core/error.h"
+#include "method_options.h"
 #include "version.h"
 
 namespace covary {
@@ -25,6 +26,7 @@ std::string text_for(const CLI::App& app, const HelpOptions& o) {
     if (command->get_name() == o.command) return help_text(*command, "covary " + o.command, o.all);
     names.push_back(command->get_name());
   }
+  if (const std::string text = help_of_method(o.command); !text.empty()) return text;
   throw Error(ErrorCode::kUsage, "unknown command '" + o.command + "'" + did_you_mean(o.command, names));
 }
 
@@ -32,8 +34,9 @@ std::string text_for(const CLI::App& app, const HelpOptions& o) {
 
 void add_help(CLI::App& app) {
   const auto o = std::make_shared<HelpOptions>();
-  CLI::App* command = app.add_subcommand("help", "Help on a command, the man page, completions for shells");
-  CLI::Option* name = command->add_option("COMMAND", o->command, "The command; without it, all are listed");
+  CLI::App* command = app.add_subcommand("help", "Help on a command or a method, the man page, completions for shells");
+  CLI::Option* name = command->add_option("COMMAND", o->command,
+                                          "The command, integrator or estimator; without it, commands are listed");
   command->add_flag("--all", o->all, "All options, as --help-all shows them");
   CLI::Option* man = command->add_flag("--man", o->man, "Print the page of all commands for man(1)")->excludes(name);
   command->add_option("--completion", o->shell, "Print the completion script of this shell")

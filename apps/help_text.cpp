@@ -18,8 +18,9 @@ size_t length(const std::string& text) {
       std::count_if(text.begin(), text.end(), [](unsigned char c) { return (c & 0xC0u) != 0x80u; }));
 }
 
-/// `text` next to its term, wrapped at kColumns columns; below it if the term is long.
-std::string entry(const std::string& term, const std::string& text) {
+}  // namespace
+
+std::string help_entry(const std::string& term, const std::string& text) {
   std::string lines = "  " + term;
   size_t column = length(lines);
   const auto begin_text = [&] { lines.append(kTextColumn - column, ' '), column = kTextColumn; };
@@ -37,12 +38,14 @@ std::string entry(const std::string& term, const std::string& text) {
   return lines + "\n";
 }
 
+namespace {
+
 std::string option_entry(const OptionDescription& option) {
-  if (option.names.empty()) return entry(option.value, option.text);
+  if (option.names.empty()) return help_entry(option.value, option.text);
   const std::string value = value_text(option);
   // Aligns long names of options without a short name with the others.
   const std::string indent = option.names[0].starts_with("--") ? "    " : "";
-  return entry(fmt::format("{}{}{}{}", indent, fmt::join(option.names, ", "), value.empty() ? "" : " ", value),
+  return help_entry(fmt::format("{}{}{}{}", indent, fmt::join(option.names, ", "), value.empty() ? "" : " ", value),
                option.text);
 }
 
@@ -73,7 +76,7 @@ std::string list_of_commands(const CLI::App& app) {
   for (const std::string& heading : headings) {
     text += "\n" + heading + ":\n";
     for (const CLI::App* command : commands)
-      if (command->get_group() == heading) text += entry(command->get_name(), command->get_description());
+      if (command->get_group() == heading) text += help_entry(command->get_name(), command->get_description());
   }
   return text;
 }

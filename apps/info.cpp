@@ -15,11 +15,11 @@
 #include "io/load_scene.h"
 #include "io/scene_file.h"
 #include "json_output.h"
+#include "method_options.h"
 #include "plans/integrator_choice.h"
 #include "plans/memory.h"
 #include "plans/render.h"
 #include "plans/render_settings.h"
-#include "settings/option_names.h"
 #include "value_names.h"
 
 namespace covary {
@@ -78,7 +78,7 @@ void scene_info(const InfoOptions& options) {
   loading.make_integrator = integrator_maker({});  // what render would refuse is refused here
   loading.view.environment = "auto";
   const LoadedScene scene = load_scene(options.path, loading);
-  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));
+  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_options(warning));
   const std::map<std::string, double> memory = memory_of_renders(scene);
   if (options.json) {
     const nlohmann::ordered_json object{{"file", options.path},

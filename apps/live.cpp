@@ -5,10 +5,12 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <optional>
 
 #include "browser.h"
 #include "commands.h"
 #include "core/error.h"
+#include "core/number_text.h"
 #include "interruption.h"
 #include "live/live_files.h"
 
@@ -28,10 +30,13 @@ std::string resuming_command(const RenderOptions& options) {
 }  // namespace
 
 void add_live_options(CLI::App& command, LiveOptions& options, const std::string& help) {
-  command.add_flag("--live", options.live, help);
-  command.add_option("--live-port", options.port, "Port of the page of --live; default: any free one")
-      ->type_name("PORT")
-      ->check(CLI::Range(1, 65535));
+  const auto check = [](std::string& port) -> std::string {
+    const std::optional<int> number = parse_number<int>(port);
+    if (number && *number >= 0 && *number <= 65535) return "";
+    return "'" + port + "': expected a port from 1 to 65535, e.g. --live=8080";
+  };
+  command.add_flag("--live{0}", options.live, help + "; --live=PORT: on this port")
+      ->transform(CLI::Validator(check, ""));
 }
 
 void announce(const LivePage& page) {
@@ -50,7 +55,7 @@ void check_live(const RenderOptions& options) {
 
 std::unique_ptr<LiveRender> live_of(const RenderOptions& options) {
   if (!options.live.wanted()) return nullptr;
-  auto live = std::make_unique<LiveRender>(options.live.port,
+  auto live = std::make_unique<LiveRender>(options.live.port(),
                                            LiveTexts{std::filesystem::path(options.scene).stem().string(),
                                                      options.request().output, resuming_command(options)},
                                            request_stop);
@@ -60,7 +65,7 @@ std::unique_ptr<LiveRender> live_of(const RenderOptions& options) {
 
 void follow(const LiveOptions& options, const std::string& path) {
   const StopFlag stop;
-  LiveFiles files(options.port, path);
+  LiveFiles files(options.port(), path);
   announce(files.page());
   files.run(*stop.token());
 }

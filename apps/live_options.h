@@ -7,12 +7,12 @@
 namespace covary {
 
 struct LiveOptions {
-  bool live = false;
-  int port = 0;  ///< 0: any free one; a port alone asks for the page, too
-  bool wanted() const { return live || port != 0; }
+  std::string live;  ///< empty: no page; else its port, or "0" for any free one
+  bool wanted() const { return !live.empty(); }
+  int port() const { return std::stoi(live); }
 };
 
-/// --live and --live-port. `help`: of the former.
+/// --live, --live=PORT.
 void add_live_options(CLI::App& command, LiveOptions& options, const std::string& help);
 
 }  // namespace covary

@@ -24,7 +24,7 @@
 #include "core/shell_text.h"
 #include "core/unfinished.h"
 #include "interruption.h"
-#include "settings/option_names.h"
+#include "method_options.h"
 #include "version.h"
 
 namespace covary {
@@ -47,7 +47,7 @@ void check_standard_output() {
 
 int report(const char* program, const Error& error) {
   std::fprintf(stderr, "%s: %s%s\n", program, error.code() == ErrorCode::kInternal ? "internal error: " : "",
-               printable(as_flags(error.what())).c_str());
+               printable(as_options(error.what())).c_str());
   if (const auto* unfinished = dynamic_cast<const Unfinished*>(&error)) return unfinished->exit_code();
   return error.code() == ErrorCode::kUsage ? 2 : 1;
 }
@@ -76,6 +76,9 @@ std::string describe_extra(const CLI::App& app) {
   const std::string extra = extras[0].substr(0, extras[0].find('='));
   const std::string help = "; see '" + name + " --help'";
   if (!extra.starts_with('-')) return "too many arguments, beginning with '" + extra + "'" + help;
+  if (const std::string present = present_form(extra.substr(std::min(extra.find_first_not_of('-'), extra.size())));
+      !present.empty())
+    return fmt::format("unknown option '{}': write {}{}", extra, present, help);
   const std::vector<std::string> near = near_options(command, extra);
   const std::string question = near.empty() ? "" : fmt::format("; did you mean '{}'?", fmt::join(near, "' or '"));
   return "unknown option '" + extra + "'" + question + help;

@@ -13,6 +13,7 @@
 #include "film/image_writer.h"
 #include "film/outputs.h"
 #include "integrators/registry.h"
+#include "method_options.h"
 #include "numbers.h"
 #include "passes/training.h"
 #include "plans/budget.h"
@@ -21,7 +22,6 @@
 #include "plans/training_stage.h"
 #include "progress.h"
 #include "render_options.h"
-#include "settings/option_names.h"
 
 namespace covary {
 namespace {
@@ -44,7 +44,7 @@ bool has_effect(const CLI::Option& option) {
   static constexpr const char* kUsed[] = {"help",    "help-all",      "output",       "integrator",     "resolution",
                                           "crop",    "seed",          "define",       "ignore-unknown", "threads",
                                           "quiet",   "no-preview",    "rfilter",      "pixel",          "height",
-                                          "samples", "load-training", "save-training"};
+                                          "samples", "load-training", "save-training", "set"};
   if (option.get_positional()) return true;
   for (const std::string& name : option.get_lnames())
     if (std::count(std::begin(kUsed), std::end(kUsed), name) > 0 || find_option(options_of_integrators(), name))
@@ -57,6 +57,12 @@ void check_effects(const CLI::App& command) {
     if (option->count() > 0 && !has_effect(*option))
       throw Error(ErrorCode::kUsage,
                   "--" + option->get_lnames()[0] + " has no effect on probes, which render no image");
+}
+
+void check_parameters(const OptionValues& of_estimator) {
+  if (!of_estimator.empty())
+    throw Error(ErrorCode::kUsage,
+                fmt::format("`{}` has no effect on probes, which render no image", of_estimator.begin()->first));
 }
 
 using Images = std::array<const Image*, 3>;
@@ -87,6 +93,7 @@ void write_preview(const std::string& path, const GuideProbe& probe) {
 void probe(ProbeOptions options) {
   RenderOptions& render = options.render;
   check_effects(*options.command);
+  check_parameters(render.of_estimator);
   if (!render.values.contains("output")) throw Error(ErrorCode::kUsage, "no output given; use -o OUT.exr");
   render.values.insert({"integrator", "guided-path"});
   render.values["spp"] = std::to_string(kAnyBudget);
@@ -102,7 +109,7 @@ void probe(ProbeOptions options) {
   const LoadedScene scene = load(render);
   outputs.reads(scene.files);
   progress.clear();
-  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));
+  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_options(warning));
   const RenderRequest request = make_request(render, scene);
   const std::shared_ptr<Integrator> integrator = prepared_integrator(scene, make_plan(render), request);
   const LearningIntegrator* learning = integrator->learning();

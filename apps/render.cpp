@@ -22,13 +22,13 @@
 #include "interruption.h"
 #include "json_output.h"
 #include "live.h"
+#include "method_options.h"
 #include "plans/render.h"
 #include "plans/result_files.h"
 #include "progress.h"
 #include "render_options.h"
 #include "render_progress.h"
 #include "render_steps.h"
-#include "settings/option_names.h"
 #include "stages.h"
 
 namespace covary {
@@ -77,7 +77,7 @@ RenderResult render_watched(const RenderOptions& options, const LoadedScene& sce
   };
   callbacks.warning = [&](const std::string& text) {
     progress.clear();
-    fmt::print(stderr, "warning: {}\n", as_flags(text));
+    fmt::print(stderr, "warning: {}\n", as_options(text));
   };
   const Plan plan = make_plan(options);
   RenderResult result =
@@ -178,10 +178,10 @@ std::unique_ptr<Display> display_of(const RenderOptions& options) {
 }
 
 void warn_of_scene(const RenderOptions& options, const LoadedScene& scene) {
-  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));
+  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_options(warning));
   if (const std::string text = advice(options.settings, estimator_of(options), scene);
       !text.empty() && !options.is_replay() && !options.quiet)
-    fmt::print(stderr, "note: {}\n", as_flags(text));
+    fmt::print(stderr, "note: {}\n", as_options(text));
   const auto given = [&](const char* option) { return options.values.contains(option); };
   if (given("sampling") && !given("estimator") && !given("denoise") && !options.is_replay() && !options.quiet)
     fmt::print(stderr, "note: --sampling renders a single pass without --denoise\n");

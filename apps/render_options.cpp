@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "declared_options.h"
 #include "io/scene_file.h"
+#include "method_options.h"
 #include "numbers.h"
 #include "passes/light_pass.h"
 #include "plans/integrator_choice.h"
@@ -168,8 +169,8 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_flag("--verbose", o.verbose, "In the summary, also speeds and the predicted error with its interval");
   add_output_options(command, o);
   add_options(command, options_of<SequenceSettings>(), o.of_sequence);
-  add_options(command, options_of_integrators(), o.of_integrator);
-  add_options(command, options_of_estimators(estimator_names()), o.of_estimator);
+  add_method_options(command, {{options_of_integrators(), &o.of_integrator},
+                               {options_of_estimators(estimator_names()), &o.of_estimator}});
 }
 
 }  // namespace covary

@@ -8,6 +8,7 @@
 
 #include "core/shell_text.h"
 #include "film/splat_layer.h"
+#include "method_options.h"
 #include "phase_times.h"
 #include "plans/integrator_trial.h"
 #include "plans/result_files.h"
@@ -15,7 +16,6 @@
 #include "render_progress.h"
 #include "render_steps.h"
 #include "risk_report.h"
-#include "settings/option_names.h"
 
 namespace covary {
 namespace {
@@ -103,7 +103,7 @@ void print_details(const RenderReport& report) {
 void print_warnings(const RenderReport& report) {
   const RenderResult& result = report.result;
   for (const std::string& warning : result.integrator->report().warnings)
-    fmt::print(stderr, "warning: {}\n", as_flags(warning));
+    fmt::print(stderr, "warning: {}\n", as_options(warning));
   print_notes(report.options.settings.denoising, result.image.note);
   const double limit = report.options.request().seconds;
   if (limit > 0 && result.seconds.limited > 1.1 * limit)

@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
+#include "method_options.h"
 #include "risk/error_interval.h"
-#include "settings/option_names.h"
 
 namespace covary {
 namespace {
@@ -52,13 +52,13 @@ void print_findings(const std::vector<Finding>& findings, bool force, bool quiet
     throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors + " (--force combines them anyway)");
   for (const Finding& f : findings) {
     const bool note = f.severity == Finding::Severity::kNote;
-    if (!note || !quiet) fmt::print(stderr, "{}: {}\n", note ? "note" : "warning", as_flags(f.text));
+    if (!note || !quiet) fmt::print(stderr, "{}: {}\n", note ? "note" : "warning", as_options(f.text));
   }
 }
 
 void print_notes(const DenoisingChoice& choice, const std::string& note) {
   for (const std::string& text : {missing_network(choice), note})
-    if (!text.empty()) fmt::print(stderr, "note: {}\n", as_flags(text));
+    if (!text.empty()) fmt::print(stderr, "note: {}\n", as_options(text));
 }
 
 void print_risks(const CombinedImage& combined, const DenoisingChoice& choice) {
@@ -81,7 +81,7 @@ void add_error_sums(const std::optional<RiskRow>& sums, nlohmann::ordered_json& 
 
 void add_network(const std::string& network, int runs, const DenoisingChoice& choice, nlohmann::ordered_json& json) {
   if (!network.empty()) json["denoiser"] = network, json["denoiser_runs"] = runs;
-  if (const std::string text = missing_network(choice); !text.empty()) json["denoiser_missing"] = as_flags(text);
+  if (const std::string text = missing_network(choice); !text.empty()) json["denoiser_missing"] = as_options(text);
 }
 
 }  // namespace covary

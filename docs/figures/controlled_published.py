@@ -16,12 +16,12 @@ import numpy
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "cli"))
 from exr_reader import read_exr  # noqa: E402
 
-COMMON = ("--rfilter", "box", "--max-depth", "5", "--integrator", "controlled-path", "--estimator", "none", "--lights",
-          "triangle", "--no-preview", "--quiet")
-METHODS = {"no control": ("--cv", "off"), "as published": ("--cv-paper",),
-           "Vévoda": ("--cv-paper", "--cv", "vevoda"), "absolute": ("--cv-paper", "--cv-variance", "absolute")}
-GRIDS = {"grid 16": ("--cv-paper", "--cv-grid", "16"),
-         "grid 256": ("--cv-paper", "--cv-grid", "256")}
+COMMON = ("--rfilter", "box", "--max-depth", "5", "--integrator", "controlled-path", "--estimator", "none", "--set",
+          "lights=triangle", "--no-preview", "--quiet")
+METHODS = {"no control": ("--set", "cv=off"), "as published": ("--cv-paper",),
+           "Vévoda": ("--cv-paper", "--set", "cv=vevoda"), "absolute": ("--cv-paper", "--set", "cv-variance=absolute")}
+GRIDS = {"grid 16": ("--cv-paper", "--set", "cv-grid=16"),
+         "grid 256": ("--cv-paper", "--set", "cv-grid=256")}
 PUBLISHED = {
     "cms-diningroom2": {"as published": 2.20, "Vévoda": 1.35}, "cms-rgbsofa": {"as published": 2.17, "Vévoda": 1.95},
     "cms-bathroom": {"as published": 1.03, "Vévoda": 1.03}, "cms-veachmis": {"as published": 1.78, "Vévoda": 1.09},

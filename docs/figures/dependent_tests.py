@@ -15,7 +15,7 @@ import tempfile
 from PIL import Image, ImageDraw, ImageFont
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-BDPT = ("--integrator", "bdpt", "--light-tracing", "off")
+BDPT = ("--integrator", "bdpt", "--set", "light-tracing=off")
 METHOD = ("--estimator", "dependent-tests")
 PAPER = (*METHOD, "--paper")
 HEIGHT = 200  # of a panel
@@ -89,11 +89,11 @@ def figure1(scene, folder):
 
 def stages(scene, number, folder):
     heading(f"Figure {number}: 50 + 50 samples")
-    scene.render("paper", *BDPT, *PAPER, "--spp", 100, "--dependent-spp", 50, "--save-stages", scene.at)
+    scene.render("paper", *BDPT, *PAPER, "--spp", 100, "--set", "dependent-spp=50", "--save-stages", scene.at)
     steps = ("dependent", "independent", "filtered", "combined")
     for step in steps:
         scene.row(step, step)
-    scene.render("exact", *BDPT, *METHOD, "--spp", 100, "--dependent-spp", 50)
+    scene.render("exact", *BDPT, *METHOD, "--spp", 100, "--set", "dependent-spp=50")
     scene.row("default instead of `--paper`", "exact")
     panels = [scene.panel(step, step) for step in steps]
     sheet(folder / f"dependent-tests-{number}.jpg", [*panels, scene.panel("default", "exact")])
@@ -101,9 +101,9 @@ def stages(scene, number, folder):
 
 def figure3(kitchen, folder):
     heading("Figure 3: Kitchen, 45 + 43 against 150 samples")
-    kitchen.render("films", *BDPT, *PAPER, "--spp", 88, "--dependent-spp", 45, "--passes", kitchen.at / "films")
+    kitchen.render("films", *BDPT, *PAPER, "--spp", 88, "--set", "dependent-spp=45", "--passes", kitchen.at / "films")
     kitchen.render("plain", *BDPT, "--estimator", "none", "--spp", 150)
-    kitchen.render("exact", *BDPT, *METHOD, "--spp", 88, "--dependent-spp", 45)
+    kitchen.render("exact", *BDPT, *METHOD, "--spp", 88, "--set", "dependent-spp=45")
     titles = {"films": "45 + 43, `--paper`", "exact": "45 + 43, default", "plain": "150, plain"}
     for name, title in titles.items():
         kitchen.row(title, name)
@@ -116,7 +116,7 @@ def figure4(kitchen, folder):
     for drop in ("0.1", "0.01"):
         for side in (2, 3, 4, 6, 8):
             name = f"region{side}-{drop}"
-            kitchen.combine(name, "films", *PAPER, "--max-region", side, "--min-centre-drop", drop)
+            kitchen.combine(name, "films", *PAPER, "--set", f"max-region={side}", "--set", f"min-centre-drop={drop}")
             kitchen.row(f"m_max {side}, {drop}", name)
             if (side, drop) in ((3, "0.1"), (4, "0.01")):
                 kitchen.run("convert", kitchen.at / f"{name}.exr", kitchen.at / f"{name}.png")
@@ -130,8 +130,8 @@ def figure5(scene, folder):
     for error in ("0.6", "0.1", "0.03"):
         for title, method in (("paper", PAPER), ("default", METHOD)):
             name = f"{title}{error}"
-            facts = scene.render(name, *BDPT, *method, "--dependent-spp", 50, "--until", f"relative={error}",
-                                 "--max-spp", 20000)
+            facts = scene.render(name, *BDPT, *method, "--set", "dependent-spp=50", "--until", f"relative={error}",
+                                 "--set", "max-spp=20000")
             scene.row(f"{error}, {title}: {facts['samples_per_pixel']:.0f} samples", name)
             if title == "paper":
                 panels.append(scene.panel(f"relative error {error}", name))
@@ -142,7 +142,7 @@ def first_samples(scene):
     heading("n of 240 samples")
     for n in (10, 25, 50, 100, 200):
         for title, method in (("paper", PAPER), ("default", METHOD)):
-            scene.render(f"{title}{n}", *BDPT, *method, "--spp", 240, "--dependent-spp", n)
+            scene.render(f"{title}{n}", *BDPT, *method, "--spp", 240, "--set", f"dependent-spp={n}")
             scene.row(f"n = {n}, {title}", f"{title}{n}")
 
 

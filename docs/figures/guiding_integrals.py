@@ -21,8 +21,9 @@ AREA = 2 * np.pi**2 / (2 * HEIGHT**2) * np.sqrt(1 - COS**2)  # of a pixel, solid
 
 def integrals(covary, sky, kind):
     """Integrand, density and control over the upper hemisphere."""
-    images = probe(covary, ROOT / "scenes/plane-under-sky.xml", "16,16", HEIGHT, "-D", f"sky={sky}", "--nee", "off",
-                   "--guiding-leaf", "300000", "--guiding-train", "98", "--cv", kind, "--cv-train", "98",
+    images = probe(covary, ROOT / "scenes/plane-under-sky.xml", "16,16", HEIGHT, "-D", f"sky={sky}", "--set", "nee=off",
+                   "--set", "guiding-leaf=300000", "--set", "guiding-train=98", "--set",
+                   f"cv={kind}", "--set", "cv-train=98",
                    "--samples", "16")
     radiance, density, control = (image[: HEIGHT // 2] for image in images)
     return radiance * COS * REFLECTANCE / np.pi, density, control

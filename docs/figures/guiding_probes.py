@@ -31,14 +31,14 @@ def signed(control, density):
 
 def main(covary, out, door):
     box = ROOT / "scenes/glossy-box.xml"
-    no_lights = ["--nee", "off", "--guiding-train", "64"]
+    no_lights = ["--set", "nee=off", "--set", "guiding-train=64"]
     places = [("box, floor", (box, "128x128", "64,117", no_lights)),
               ("box, metal", (box, "128x128", "64,42", no_lights)),
-              ("door, floor", (door, "160x90", "80,78", ["--guiding-train", "32"]))]
+              ("door, floor", (door, "160x90", "80,78", ["--set", "guiding-train=32"]))]
     rows = []
     for title, (scene, resolution, pixel, options) in places:
         radiance, density, control = probe(covary, scene, pixel, HEIGHT, "--resolution", resolution, "--samples", "64",
-                                           "--cv", "rgb", *options)
+                                           "--set", "cv=rgb", *options)
         rows.append((title, [tone(radiance), tone(density), signed(control, density)]))
     save(rows, ("radiance", "density", "control"), (12, 6.1), out)
 

@@ -13,6 +13,7 @@
 #include "estimators/mean.h"
 #include "estimators/polynomials.h"
 #include "risk/held_out_error.h"
+#include "settings/option_names.h"
 
 namespace covary {
 
@@ -52,8 +53,8 @@ Estimator make_estimator(const std::string& name, const OptionValues& values) {
   for (const Option& option : own) {
     const auto given = values.find(option.name);
     if (given == values.end()) continue;
-    estimator.text += " --" + option.name;
-    if (option.type != Option::Type::kFlag) estimator.text += " " + given->second;
+    estimator.text += is_parameter(option) ? fmt::format(" --set {}={}", option.name, given->second)
+                                           : fmt::format(" --{}", option.name);
   }
   return with_held_out_rows(estimator);
 }

@@ -122,7 +122,7 @@ TEST(EstimatorRegistry, ValuesReachTheOptions) {
   exact.window = 5;
   EXPECT_EQ(made("dependent-tests", {{"window", "5"}}), dependent_tests(g, h, exact).estimate.data);
   EXPECT_EQ(make_estimator("polynomials").film_settings, "polynomials dimensions=4");
-  EXPECT_EQ(make_estimator("iicv", {{"paper", ""}, {"k", "50"}}).text, "iicv --paper --k 50");
+  EXPECT_EQ(make_estimator("iicv", {{"paper", ""}, {"k", "50"}}).text, "iicv --paper --set k=50");
 }
 
 /// What each estimator claims is true.
@@ -276,8 +276,8 @@ std::string row_of(const Option& o) {
                              : o.type == Type::kChoice ? fmt::format("{}", fmt::join(o.choices, ", "))
                              : o.type == Type::kWhole  ? "whole, " + o.range.text()
                                                        : o.range.text();
-  return fmt::format("| `--{}` | {} | {} | {} |", o.name, values, o.type == Type::kFlag ? "off" : o.default_value,
-                     as_flags(o.help));
+  return fmt::format("| `{}{}` | {} | {} | {} |", is_parameter(o) ? "" : "--", o.name, values,
+                     o.type == Type::kFlag ? "off" : o.default_value, as_flags(o.help));
 }
 
 /// The page has a row for each estimator, and below its heading one for each of its options; no others.

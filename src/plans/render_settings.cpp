@@ -12,6 +12,7 @@
 #include "passes/light_pass.h"
 #include "passes/training.h"
 #include "plans/integrator_choice.h"
+#include "settings/option_names.h"
 
 namespace covary {
 namespace {
@@ -177,9 +178,9 @@ std::vector<std::string> replay_words(OptionValues values, const Pass& pass, con
   if (is_sobol || values.contains("sampler")) values["sampler"] = sampler_name(pass.settings.sampler);
   // The weights of sampling strategies depend on whether light is traced.
   if (pass.integrator->light_tracing()) values["light-tracing"] = light_tracer(*pass.integrator) ? "on" : "off";
-  const std::vector<Option> of_integrators = options_of_integrators();
-  options.insert(options.end(), of_integrators.begin(), of_integrators.end());
   std::vector<std::string> words = option_words(options, values);
+  const std::vector<std::string> of_integrator = method_words(options_of_integrators(), values);
+  words.insert(words.end(), of_integrator.begin(), of_integrator.end());
   const std::string sample =
       pass.plan.light ? fmt::format("light,{}", bad.sample) : fmt::format("{},{},{}", bad.x, bad.y, bad.sample);
   const std::string number = !pass.plan.light && pass.plan.number ? fmt::format(",{}", pass.plan.number) : "";

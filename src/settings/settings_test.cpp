@@ -155,6 +155,12 @@ TEST(OptionNames, AreShownAsTheReaderKnowsThem) {
   const std::string text = "`cv-grid`, `k` have no effect with `cv` off; 'a`b', ``, `No name` and `x y` `z`";
   EXPECT_EQ(as_flags(text), "--cv-grid, --k have no effect with --cv off; 'a`b', ``, `No name` and `x y` --z");
   EXPECT_EQ(as_arguments(text), "cv_grid, k have no effect with cv off; 'a`b', ``, `No name` and `x y` z");
+  const std::vector<Option> parameters = {{.name = "cv", .type = Option::Type::kChoice, .choices = {"rgb", "off"}},
+                                          {.name = "cv-grid", .type = Option::Type::kWhole}};
+  EXPECT_EQ(as_flags(text, parameters),
+            "--set cv-grid, --k have no effect with --set cv=off; 'a`b', ``, `No name` and `x y` --z");
+  EXPECT_EQ(as_flags("`cv-grid` 64 `cv` or `cv` rgb: `cv-grid` 'x'", parameters),
+            "--set cv-grid=64 --set cv or --set cv=rgb: --set cv-grid 'x'");
   for (const char* same : {"", "`", "no names", "an open `name"}) EXPECT_EQ(as_flags(same), same);
 }
 
@@ -188,6 +194,17 @@ TEST(Options, WordsOfACommandLine) {
   const OptionValues values = {{"fog-name", "x\ny"}, {"fog-thick", ""}, {"fog-steps", "8"}, {"other", "1"}};
   EXPECT_EQ(option_words(listed(), values),
             (Words{"--fog-steps", "8", "--fog-thick", "--fog-name", "x", "--fog-name", "y"}));
+}
+
+TEST(Options, WordsOfMethods) {
+  std::vector<Option> options = listed();
+  const auto level_of = [&](const char* name) -> OptionLevel& {
+    return std::find_if(options.begin(), options.end(), [&](const Option& o) { return o.name == name; })->level;
+  };
+  const OptionValues values = {{"fog-thick", ""}, {"fog-steps", "8"}, {"fog-grid", "auto"}, {"other", "1"}};
+  EXPECT_EQ(method_words(options, values), (Words{"--set", "fog-steps=8", "--set", "fog-grid=auto", "--fog-thick"}));
+  level_of("fog-steps") = OptionLevel::kBasic;
+  EXPECT_EQ(method_words(options, values), (Words{"--fog-steps", "8", "--set", "fog-grid=auto", "--fog-thick"}));
 }
 
 TEST(Options, MergedListsTellWhereTheyDiffer) {

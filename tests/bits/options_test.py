@@ -25,12 +25,12 @@ MODES = ("auto", "bias", "balanced", "error")
 #: Methods that combine a pair: words of the program.
 PAIR = [
     *[("--estimator", "iicv", *words.split()) for words in (
-        "", "--paper", "--k 9", "--window 7", "--penalty asymmetric", "--penalty sample", "--paper --k 50",
-        "--paper --penalty sample", "--paper --penalty asymmetric")],
+        "", "--paper", "--set k=9", "--set window=7", "--set penalty=asymmetric", "--set penalty=sample",
+        "--paper --set k=50", "--paper --set penalty=sample", "--paper --set penalty=asymmetric")],
     *[("--estimator", "cv-baseline", *words.split()) for words in (
-        "", "--ridge 0.1", "--k 50 --window 11")],
-    *[("--estimator", "iduw", "--samples", "96", *words) for words in ((), ("--window", "7"))],
-    *[("--estimator", "dependent-tests", *words.split()) for words in ("", "--paper", "--paper --falloff spline")],
+        "", "--set ridge=0.1", "--set k=50 --set window=11")],
+    *[("--estimator", "iduw", "--samples", "96", *words) for words in ((), ("--set", "window=7"))],
+    *[("--estimator", "dependent-tests", *words.split()) for words in ("", "--paper", "--paper --set falloff=spline")],
 ]
 #: With denoising.
 DENOISED_PAIR = [
@@ -204,6 +204,9 @@ def keywords(words):
     for name, *rest in zip(words, [*words[1:], "--"]):
         if name.startswith("--"):
             value = True if rest[0].startswith("--") else rest[0]
+            if name == "--set":
+                parameter, value = value.split("=")
+                name = "--" + parameter
             numeric = value is not True and value.replace(".", "").isdecimal()
             result[name[2:].replace("-", "_")] = float(value) if numeric and "." in value else (
                 int(value) if numeric else value)

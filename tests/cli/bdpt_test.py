@@ -45,10 +45,11 @@ class Bdpt(CliTest):
     def test_scenes_without_light_are_black(self):
         (self.path / "scene.xml").write_text(re.sub(r"<emitter.*?</emitter>", "", SCENE).replace('value="off"',
                                                                                               'value="auto"'))
-        for options in ((), ("--light-tracing", "on"), ("--estimator", "none", "--adaptive"), ("--estimator", "iicv"),
+        for options in ((), ("--set", "light-tracing=on"), ("--estimator", "none", "--adaptive"),
+                        ("--estimator", "iicv"),
                         ("--estimator", "iicv", "--adaptive"), ("--estimator", "dependent-tests"),
                         ("--estimator", "dependent-tests", "--paper"),
-                        ("--estimator", "dependent-tests", "--until", "relative=0.1", "--max-spp", "9")):
+                        ("--estimator", "dependent-tests", "--until", "relative=0.1", "--set", "max-spp=9")):
             self.good("render", "scene.xml", "-o", "a.exr", "--spp", "16", "--quiet", "--no-preview", "--environment",
                       "none", *options)
             self.assertEqual({v for channel in self.pixels("a.exr") for v in channel}, {0.0}, options)

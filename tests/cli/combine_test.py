@@ -213,12 +213,12 @@ class Combine(CliTest):
 
     def test_wrong_usage(self):
         inputs = ["combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "out.exr"]
-        self.bad(2, "k is 500, expected 1 to 121", *inputs, "--k", "500")
-        self.bad(2, "--window: '10': expected an odd whole number from 3 to 63", *inputs, "--window", "10")
-        self.bad(2, "--penalty is an option of --estimator iicv, not of iduw", *inputs, "--estimator", "iduw",
-                 "--penalty", "pilot")
+        self.bad(2, "k is 500, expected 1 to 121", *inputs, "--set", "k=500")
+        self.bad(2, "--set window: '10': expected an odd whole number from 3 to 63", *inputs, "--set", "window=10")
+        self.bad(2, "--set penalty is an option of --estimator iicv, not of iduw", *inputs, "--estimator", "iduw",
+                 "--set", "penalty=pilot")
         self.bad(2, "--samples is an option of --counts and --estimator iduw, not of iicv", *inputs, "--samples", "3")
-        self.bad(2, "--penalty", *inputs, "--penalty", "none")
+        self.bad(2, "--set penalty: 'none'", *inputs, "--set", "penalty=none")
         self.bad(2, "--independent is required", "combine", "--crn", "crn.exr", "-o", "out.exr")
         self.layers("two.exr", self.crn_images[:2])
         self.bad(2, "the CRN image has 2 groups, at least 3 are needed", "combine", "--crn", "two.exr", "--independent",

@@ -14,27 +14,28 @@ from training_tests import LearningFiles, LearningFilms, LearningTest
 
 ROOM = str(Path(os.environ["SCENES"]) / "room.xml")
 RENDER = ("render", ROOM, "--resolution", "48x32", "--no-preview", "--integrator", "controlled-path")
-PLAIN = (*RENDER, "--estimator", "none", "--cv-train", "4")
+PLAIN = (*RENDER, "--estimator", "none", "--set", "cv-train=4")
 
 
 class Options(CliTest):
     def test_refuses_options_of_another_integrator(self):
-        self.bad(2, "--cv is an option of --integrator controlled-path, guided-path, not of path", "render", ROOM,
-                 "-o", "a.exr", "--cv", "off")
-        self.bad(2, "--lights is an option of --integrator controlled-path, not of bdpt", "render", ROOM, "-o",
-                 "a.exr", "--integrator", "bdpt", "--lights", "power")
+        self.bad(2, "--set cv is an option of --integrator controlled-path, guided-path, not of path", "render", ROOM,
+                 "-o", "a.exr", "--set", "cv=off")
+        self.bad(2, "--set lights is an option of --integrator controlled-path, not of bdpt", "render", ROOM, "-o",
+                 "a.exr", "--integrator", "bdpt", "--set", "lights=power")
 
     def test_refuses_grids_of_no_cells(self):
         for grid in ("-1", "half", "65537"):
-            self.bad(2, f"--cv-grid: '{grid}': expected auto or a whole number from 0 to 65536", *RENDER, "-o", "a.exr",
-                     "--cv-grid=" + grid)
+            self.bad(2, f"--set cv-grid: '{grid}': expected auto or a whole number from 0 to 65536", *RENDER, "-o",
+                     "a.exr", "--set", "cv-grid=" + grid)
 
     def test_refuses_options_without_effect(self):
-        for option, *others in (("--cv-grid", "8", "--cv", "off"), ("--cv-variance", "absolute", "--cv", "optimal-mis"),
-                                ("--lights", "learned", "--cv-train", "4")):
-            self.bad(2, f"{option} has no effect with", *RENDER, "-o", "a.exr", option, *others)
-        self.good(*RENDER, "--estimator", "none", "--spp", "20", "-o", "a.exr", "--cv", "off", "--lights", "learned",
-                  "--cv-train", "8")
+        for name, value, other in (("cv-grid", "8", "cv=off"), ("cv-variance", "absolute", "cv=optimal-mis"),
+                                   ("lights", "learned", "cv-train=4")):
+            self.bad(2, f"--set {name} has no effect with --set {other}: ", *RENDER, "-o", "a.exr", "--set",
+                     f"{name}={value}", "--set", other)
+        self.good(*RENDER, "--estimator", "none", "--spp", "20", "-o", "a.exr", "--set", "cv=off",
+                  "--set", "lights=learned", "--set", "cv-train=8")
 
     def test_refuses_more_training_than_samples(self):
         self.bad(2, "16 samples per pixel, of which the training takes 16, leave none for the image", *RENDER, "-o",
@@ -49,7 +50,7 @@ class Options(CliTest):
         self.assertGreater(min(seconds["surrogate"], seconds["solve"]), 0)
         self.assertLess(seconds["surrogate"] + seconds["solve"], seconds["train"])
         self.assertGreater(report["planned_memory_bytes"], 3 * 256 << 20)
-        self.good(*RENDER, "--cv", "off", "--estimator", "none", "--spp", "12", "-o", "b.exr", "--json", "b.json")
+        self.good(*RENDER, "--set", "cv=off", "--estimator", "none", "--spp", "12", "-o", "b.exr", "--json", "b.json")
         report = json.loads((self.path / "b.json").read_text())
         self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (12, 0))
         self.assertNotIn("control_variates", report)
@@ -57,7 +58,7 @@ class Options(CliTest):
 
 
 class Controlled:
-    RENDER, PLAIN, OTHER_SETTING = (*RENDER, "--cv-train", "4"), PLAIN, ("--cv-grid", "7")
+    RENDER, PLAIN, OTHER_SETTING = (*RENDER, "--set", "cv-train=4"), PLAIN, ("--set", "cv-grid=7")
 
 
 class Films(Controlled, LearningFilms, CliTest):
@@ -87,15 +88,15 @@ class Films(Controlled, LearningFilms, CliTest):
 class Surrogate(LearningTest, CliTest):
     def test_does_not_follow_from_what_is_installed(self):
         self.good(*PLAIN, "--spp", "6", "-o", "a.exr")
-        self.good(*PLAIN, "--spp", "6", "-o", "b.exr", "--cv-variance", "relative",
+        self.good(*PLAIN, "--spp", "6", "-o", "b.exr", "--set", "cv-variance=relative",
                   env={**os.environ, "COVARY_OIDN": "/nowhere"})
         self.assertEqual(self.pixels("a.exr")["R"], self.pixels("b.exr")["R"])
         attributes = json.loads(self.good("info", "a.exr", "--json").stdout)["attributes"]
         self.assertNotIn("oidn", attributes["covary:settings"])
 
     def test_by_a_denoiser_that_is_missing(self):
-        result = self.run_covary(*PLAIN, "--spp", "6", "-o", "a.exr", "--passes", "films", "--cv-variance",
-                                 "relative-oidn", env={**os.environ, "COVARY_OIDN": "/nowhere"})
+        result = self.run_covary(*PLAIN, "--spp", "6", "-o", "a.exr", "--passes", "films", "--set",
+                                 "cv-variance=relative-oidn", env={**os.environ, "COVARY_OIDN": "/nowhere"})
         self.assertEqual(result.returncode, 2, result.stderr)
         self.assertIn("Open Image Denoise was not found (/nowhere", result.stderr)
         self.assertFalse((self.path / "a.exr").exists())
@@ -113,7 +114,7 @@ class Surrogate(LearningTest, CliTest):
     def test_by_the_denoiser_that_is_named(self):
         """Another one that the machine has is not taken."""
         library = os.environ["STAND_IN_DENOISER"]
-        by_oidn = (*PLAIN, "--spp", "6", "--cv-variance", "relative-oidn")
+        by_oidn = (*PLAIN, "--spp", "6", "--set", "cv-variance=relative-oidn")
         nowhere = {**os.environ, "COVARY_OIDN": "/nowhere"}
         self.good(*PLAIN, "--spp", "6", "-o", "a.exr")
         self.good(*by_oidn, "-o", "b.exr", "--oidn", library, env=nowhere)
@@ -124,16 +125,16 @@ class Surrogate(LearningTest, CliTest):
         self.assertNotEqual(replay, self.good(*PLAIN, "--spp", "6", "--replay", "7,5,0").stdout)
         self.bad(2, "Open Image Denoise was not found (/nowhere/lib.so", *by_oidn, "-o", "d.exr", "--oidn",
                  "/nowhere/lib.so")
-        self.bad(2, "--cv-variance relative-oidn needs Open Image Denoise, which --oidn off leaves out", *by_oidn, "-o",
-                 "d.exr", "--oidn", "off")
+        self.bad(2, "--set cv-variance=relative-oidn needs Open Image Denoise, which --oidn off leaves out", *by_oidn,
+                 "-o", "d.exr", "--oidn", "off")
         self.bad(2, "--oidn has no effect without --denoise auto, bias, balanced or error, and no training with "
-                 "--cv-variance relative-oidn", *PLAIN, "--spp", "6", "-o", "d.exr", "--oidn", library)
+                 "--set cv-variance=relative-oidn", *PLAIN, "--spp", "6", "-o", "d.exr", "--oidn", library)
 
     def test_by_a_denoiser_that_is_there(self):
         if self.run_covary("denoise", "--check").returncode != 0:
             self.skipTest("Open Image Denoise is not installed")
         self.good(*PLAIN, "--spp", "6", "-o", "a.exr")
-        self.good(*PLAIN, "--spp", "6", "-o", "b.exr", "--cv-variance", "relative-oidn")
+        self.good(*PLAIN, "--spp", "6", "-o", "b.exr", "--set", "cv-variance=relative-oidn")
         self.assertNotEqual(self.pixels("a.exr")["R"], self.pixels("b.exr")["R"])
         attributes = json.loads(self.good("info", "b.exr", "--json").stdout)["attributes"]
         self.assertIn("variance=relative-oidn", attributes["covary:settings"])
@@ -154,7 +155,7 @@ class PathLengths(CliTest):
             self.assertGreater(max(map(abs, channels[f"Edges0{n}.G"])), 1e-3)
 
     def test_are_parts_of_what_shorter_paths_see(self):
-        off = ("--cv", "off", "--spp", "4", "--estimator", "none")
+        off = ("--set", "cv=off", "--spp", "4", "--estimator", "none")
         self.good(*RENDER, *off, "--max-depth", "4", "--layers", "path-lengths", "-o", "a.exr")
         text = Path(ROOM).read_text()
         (self.path / "direct.xml").write_text(re.sub("(<integrator[^>]*>)", r'\1<integer name="min_depth" value="2"/>',
@@ -171,14 +172,14 @@ class PathLengths(CliTest):
 
 class TrainingFiles(Controlled, LearningFiles, CliTest):
     def test_keep_the_learned_probabilities_of_lights(self):
-        learned = (*RENDER, "--estimator", "none", "--cv-train", "8", "--lights", "learned")
+        learned = (*RENDER, "--estimator", "none", "--set", "cv-train=8", "--set", "lights=learned")
         self.good(*learned, "--spp", "12", "-o", "l.exr", "--save-training", "l.training")
         self.good(*learned, "--spp", "4", "-o", "m.exr", "--load-training", "l.training")
         self.assertEqual(self.pixels("l.exr")["group00.G"], self.pixels("m.exr")["G"])
 
     def test_belong_to_control_variates(self):
-        self.bad(2, "only the integrator controlled-path with control variates", *RENDER, "--cv", "off", *self.WANTED,
-                 "a.training")
+        self.bad(2, "only the integrator controlled-path with control variates", *RENDER, "--set", "cv=off",
+                 *self.WANTED, "a.training")
 
 
 if __name__ == "__main__":

@@ -34,7 +34,7 @@ class DependentTests(RenderTest):
         self.assertLess(errors["exact"], errors["paper"])
 
     def test_combine_of_kept_films_gives_the_same_bits(self):
-        for options in ((), ("--paper", "--max-region", "3")):
+        for options in ((), ("--paper", "--set", "max-region=3")):
             self.good("render", ROOM, *SMALL, "-o", "a.exr", *METHOD, *options, "--spp", "32", "--passes", "films",
                       "--overwrite")
             self.good("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "b.exr",
@@ -58,7 +58,7 @@ class DependentTests(RenderTest):
 
     def test_stages_of_an_image_that_missed_its_target(self):
         result = self.run_covary("render", ROOM, *SMALL, "-o", "a.exr", *METHOD, "--until", "relative=1e-9",
-                                 "--max-spp", "24", "--save-stages", "steps")
+                                 "--set", "max-spp=24", "--save-stages", "steps")
         self.assertEqual(result.returncode, 3, result.stderr)
         self.assertEqual(sorted(p.name for p in (self.path / "steps").iterdir()),
                          sorted(f"{name}.{end}" for name in STAGES for end in ("exr", "png")))
@@ -87,7 +87,7 @@ class DependentTests(RenderTest):
 
     def test_a_relative_error_that_is_not_reached_ends_like_until(self):
         for method in (METHOD, ("--estimator", "iicv", "--adaptive"), ("--estimator", "none", "--adaptive")):
-            for limit in (("--spp", "48"), ("--max-spp", "24")):
+            for limit in (("--spp", "48"), ("--set", "max-spp=24")):
                 result = self.run_covary("render", ROOM, *SMALL, "-o", "a.exr", *method, "--until", "relative=1e-9",
                                          *limit)
                 self.assertEqual(result.returncode, 3, result.stderr)
@@ -99,13 +99,15 @@ class DependentTests(RenderTest):
         self.bad(2, "--split: the first pass of dependent-tests has its own number", *render, "--split", "1:2")
         self.bad(2, "does not estimate its error; use relative=X", *render, "--until", "relmse=0.1")
         self.bad(2, "expected relmse=X, relmse-p95=X or relative=X with X > 0", *render, "--until", "relative=0")
-        self.bad(2, "expected a whole number from 1 to 63", *render, "--max-region", "0")
-        self.bad(2, "--dependent-spp: '0': expected a whole number of at least 1", *render, "--dependent-spp", "0")
+        self.bad(2, "expected a whole number from 1 to 63", *render, "--set", "max-region=0")
+        self.bad(2, "--set dependent-spp: '0': expected a whole number of at least 1", *render,
+                 "--set", "dependent-spp=0")
         self.bad(2, "20 samples per pixel are too few for dependent-tests: its first pass takes 20", *render, "--spp",
-                 "20", "--dependent-spp", "20")
-        self.bad(2, "--k is an option of --estimator iicv, cv-baseline, not of dependent-tests", *render, "--k", "3")
-        self.bad(2, "--max-region is an option of --estimator dependent-tests, not of mixture", "render", ROOM, "-o",
-                 "a.exr", "--max-region", "3")
+                 "20", "--set", "dependent-spp=20")
+        self.bad(2, "--set k is an option of --estimator iicv, cv-baseline, not of dependent-tests", *render,
+                 "--set", "k=3")
+        self.bad(2, "--set max-region is an option of --estimator dependent-tests, not of mixture", "render", ROOM,
+                 "-o", "a.exr", "--set", "max-region=3")
         self.bad(2, "--save-stages: iicv has no single steps", "render", ROOM, "-o", "a.exr", "--save-stages", "s",
                  "--estimator", "iicv")
         self.bad(2, "--save-stages: none has no single steps", "render", ROOM, "-o", "a.exr", "--save-stages", "s",
@@ -141,10 +143,10 @@ class Adaptive(RenderTest):
 
     def test_wrong_options(self):
         render = ("render", ROOM, *SMALL, "-o", "a.exr", "--estimator", "none")
-        self.bad(2, "--max-spp has no effect without --adaptive", *render, "--max-spp", "8")
+        self.bad(2, "--set max-spp has no effect without --adaptive", *render, "--set", "max-spp=8")
         self.bad(2, "--adaptive always takes independent random numbers", *render, "--adaptive", "--sampling", "crn")
-        self.bad(2, "--max-spp is 1, expected at least 12, one sample for each group", "render", ROOM, *SMALL,
-                 "-o", "a.exr", "--estimator", "iicv", "--adaptive", "--max-spp", "1", "--spp", "96")
+        self.bad(2, "--set max-spp is 1, expected at least 12, one sample for each group", "render", ROOM, *SMALL,
+                 "-o", "a.exr", "--estimator", "iicv", "--adaptive", "--set", "max-spp=1", "--spp", "96")
 
 
 if __name__ == "__main__":

@@ -71,7 +71,7 @@ class Trainings(DestructionTest):
 
     def test_damaged(self):
         chance = random.Random(400)
-        for learner in (("controlled-path", "--cv-train", "4"), ("guided-path", "--guiding-train", "4")):
+        for learner in (("controlled-path", "--set", "cv-train=4"), ("guided-path", "--set", "guiding-train=4")):
             plain = (*RENDER, "--estimator", "none", "--integrator", *learner)
             self.good(*plain, "--spp", "8", "-o", "a.exr", "--save-training", "whole", "--overwrite")
             whole = (self.path / "whole").read_bytes()

@@ -13,20 +13,20 @@ from exr_reader import read_exr
 from training_tests import LearningFiles, LearningFilms
 
 ROOM = str(Path(os.environ["SCENES"]) / "room.xml")
-RENDER = ("render", ROOM, "--resolution", "48x32", "--no-preview", "--integrator", "guided-path", "--guiding-train",
-          "4")
+RENDER = ("render", ROOM, "--resolution", "48x32", "--no-preview", "--integrator", "guided-path", "--set",
+          "guiding-train=4")
 PLAIN = (*RENDER, "--estimator", "none")
 
 
 class Options(CliTest):
     def test_refuses_options_of_another_integrator(self):
-        self.bad(2, "--nee is an option of --integrator guided-path, not of path", "render", ROOM, "-o", "a.exr",
-                 "--nee", "off")
-        self.bad(2, "--integrator controlled-path, not of guided-path", *PLAIN, "-o", "a.exr", "--cv-grid", "8")
+        self.bad(2, "--set nee is an option of --integrator guided-path, not of path", "render", ROOM, "-o", "a.exr",
+                 "--set", "nee=off")
+        self.bad(2, "--integrator controlled-path, not of guided-path", *PLAIN, "-o", "a.exr", "--set", "cv-grid=8")
 
     def test_control_variates(self):
-        self.bad(2, "--cv 'vevoda': expected rgb, mono, off", *PLAIN, "-o", "a.exr", "--cv", "vevoda")
-        self.good(*PLAIN, "--cv", "rgb", "--cv-train", "8", "--spp", "20", "-o", "a.exr", "--json", "a.json")
+        self.bad(2, "--set cv 'vevoda': expected rgb, mono, off", *PLAIN, "-o", "a.exr", "--set", "cv=vevoda")
+        self.good(*PLAIN, "--set", "cv=rgb", "--set", "cv-train=8", "--spp", "20", "-o", "a.exr", "--json", "a.json")
         report = json.loads((self.path / "a.json").read_text())
         self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (8, 12))
         self.assertGreaterEqual(report["guiding"]["controlled_leaves"], 1)
@@ -36,12 +36,12 @@ class Options(CliTest):
         (self.path / "point.xml").write_text(Path(ROOM).read_text().replace("</scene>", point))
         render = ("render", "point.xml", *PLAIN[2:], "--spp", "5", "-o", "a.exr")
         self.assertNotIn("not seen", self.good(*render).stderr)
-        self.assertIn("without light samples (--nee off), point and directional lights are invisible: 1 of ",
-                      self.good(*render, "--nee", "off").stderr)
+        self.assertIn("without light samples (--set nee=off), point and directional lights are invisible: 1 of ",
+                      self.good(*render, "--set", "nee=off").stderr)
 
     def test_refuses_impossible_numbers(self):
-        for option, value in (("--guiding-leaf", "199"), ("--guiding-train", "0"), ("--nee", "1")):
-            self.bad(2, option, *PLAIN, "-o", "a.exr", option, value)
+        for parameter in ("guiding-leaf=199", "guiding-train=0", "nee=1"):
+            self.bad(2, "--set " + parameter.split("=")[0], *PLAIN, "-o", "a.exr", "--set", parameter)
 
     def test_refuses_more_training_than_samples(self):
         self.bad(2, "4 samples per pixel, of which the training takes 4, leave none for the image", *PLAIN, "-o",
@@ -66,14 +66,14 @@ class Options(CliTest):
                        'value="4000"/><boolean name="nee" value="false"/>', scene, count=1)
         (self.path / "guided.xml").write_text(scene)
         self.good("render", "guided.xml", "--resolution", "24x16", "--no-preview", "--estimator", "none", "--spp", "20",
-                  "--guiding-train", "16", "-o", "a.exr")
+                  "--set", "guiding-train=16", "-o", "a.exr")
         settings = json.loads(self.good("info", "a.exr", "--json").stdout)["attributes"]["covary:settings"]
         self.assertIn("leaf=4000 train=16", settings)
         self.assertIn("nee=off", settings)
 
 
 class Guided:
-    RENDER, PLAIN, OTHER_SETTING = RENDER, PLAIN, ("--guiding-leaf", "900")
+    RENDER, PLAIN, OTHER_SETTING = RENDER, PLAIN, ("--set", "guiding-leaf=900")
 
 
 class Films(Guided, LearningFilms, CliTest):
@@ -86,10 +86,10 @@ class Films(Guided, LearningFilms, CliTest):
 
 
 class Probe(CliTest):
-    PROBE = ("probe", *RENDER[1:4], "--guiding-train", "4", "-o", "a.exr")
+    PROBE = ("probe", *RENDER[1:4], "--set", "guiding-train=4", "-o", "a.exr")
 
     def test_density_integrates_to_one(self):
-        self.good(*self.PROBE, "--pixel", "4,4", "--samples", "2", "--cv", "rgb", "--cv-train", "12")
+        self.good(*self.PROBE, "--pixel", "4,4", "--samples", "2", "--set", "cv=rgb", "--set", "cv-train=12")
         channels, height = read_exr((self.path / "a.exr").read_bytes()), 64
         width, sums = 2 * height, [0, 0, 0]
         for y in range(height):
@@ -112,13 +112,14 @@ class Probe(CliTest):
         listed = self.good("probe", "--help-all").stdout
         completed = self.good("help", "--completion", "bash").stdout
         for option in (("--spp", "8"), ("--time", "1"), ("--until", "relmse=1"), ("--estimator", "none"), ("--aovs",),
-                       ("--sampler", "sobol"), ("--denoise", "error"), ("--passes", "x"), ("--k", "7"), ("--resume",),
+                       ("--sampler", "sobol"), ("--denoise", "error"), ("--passes", "x"), ("--resume",),
                        ("--json", "-"), ("--replay", "1,2,3"), ("--oidn", "off"), ("--checkpoint", "4")):
             self.bad(2, option[0] + " has no effect on probes", *self.PROBE, "--pixel", "4,4", *option)
             self.assertNotIn(option[0] + " ", listed)
             self.assertNotIn(f"'probe {option[0]}'", completed)
+        self.bad(2, "--set k has no effect on probes", *self.PROBE, "--pixel", "4,4", "--set", "k=7")
         self.assertIn("'probe --seed'", completed)
-        for option in ("--seed", "--crop", "--guiding-train", "--load-training", "--pixel"):
+        for option in ("--seed", "--crop", "--set", "--load-training", "--pixel"):
             self.assertRegex(listed, option + "[ ,]")
 
     def test_refuses_what_it_cannot_show(self):

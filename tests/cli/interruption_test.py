@@ -64,7 +64,7 @@ class WhileDenoising(CliTest):
         room = str(Path(os.environ["SCENES"]) / "room.xml")
         small = ("--resolution", "24x16", "--spp", "24", "--quiet", "--no-preview")
         library = os.environ["STAND_IN_DENOISER"]
-        surrogate = ("--integrator", "controlled-path", "--cv-variance", "relative-oidn", "--oidn", library)
+        surrogate = ("--integrator", "controlled-path", "--set", "cv-variance=relative-oidn", "--oidn", library)
         cases = (("render", room, *small, "-o", "a.exr", "--denoise", "error", "--oidn", library),
                  ("render", room, *small, "-o", "b.exr", *surrogate))
         for command in cases:

@@ -254,7 +254,7 @@ class Kills(FilmsTest):
 
     def test_at_any_time(self):
         chance = random.Random(75)
-        renders = (IICV, ("--oidn", "off", "--integrator", "bdpt", "--light-tracing", "on"),
+        renders = (IICV, ("--oidn", "off", "--integrator", "bdpt", "--set", "light-tracing=on"),
                    ("--estimator", "none", "--sampler", "sobol"))
         for number, options in enumerate(renders):
             command = (*PLAIN[:-1], "96", "--passes", f"films{number}", "--checkpoint", "0.02", *options)

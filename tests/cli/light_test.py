@@ -46,14 +46,14 @@ class Render(LightTest):
         self.assert_sum("a.exr", "films/independent.exr", "films/light.exr")
         self.assertEqual(self.attributes("films/light.exr")["covary:light_paths_per_sample"], "256")
         self.assertEqual(self.attributes("a.exr")["covary:light_film"], "added")
-        facts = self.render("-o", "c.exr", "--estimator", "none", "--spp", "8", "--light-tracing", "off")
+        facts = self.render("-o", "c.exr", "--estimator", "none", "--spp", "8", "--set", "light-tracing=off")
         self.assertNotIn("light_paths", facts)
         self.assertIn("light_tracing=off", self.attributes("c.exr")["covary:settings"])
 
     def test_beside_common_random_numbers(self):
         facts = self.render("-o", "off.exr", *IICV, "--spp", "24")
         self.assertNotIn("light_paths", facts)
-        facts = self.render("-o", "on.exr", *IICV, "--spp", "24", "--light-tracing", "on", "--passes", "films")
+        facts = self.render("-o", "on.exr", *IICV, "--spp", "24", "--set", "light-tracing=on", "--passes", "films")
         self.assertEqual(facts["light_paths"], 24 * PIXELS)
         self.assertGreater(facts["predicted_relmse"], 0)
         combine = ("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "--error", "--quiet",
@@ -87,11 +87,11 @@ class Render(LightTest):
         self.bad(2, "there are no light paths", "render", CAUSTIC, *IICV, "--replay", "light,0")
 
     def test_other_integrators_have_no_such_options(self):
-        self.bad(2, "--light-tracing is an option of --integrator bdpt, not of path", "render", CAUSTIC,
-                 "--integrator", "path", "-o", "a.exr", "--light-tracing", "on")
+        self.bad(2, "--set light-tracing is an option of --integrator bdpt, not of path", "render", CAUSTIC,
+                 "--integrator", "path", "-o", "a.exr", "--set", "light-tracing=on")
         self.bad(2, "--replay light is for integrators that trace light; 'path' does not", "render", CAUSTIC,
                  "--integrator", "path", "-o", "a.exr", "--replay", "light,3")
-        self.bad(2, "'yes': expected auto, on, off", "render", CAUSTIC, "-o", "a.exr", "--light-tracing", "yes")
+        self.bad(2, "'yes': expected auto, on, off", "render", CAUSTIC, "-o", "a.exr", "--set", "light-tracing=yes")
         self.assertNotIn("light_paths", self.render("-o", "a.exr", "--integrator", "path", "--spp", "24"))
         # The settings of an integrator that another one replaces are no mistakes.
         element = '<string name="light_tracing" value="on"/></integrator>'
@@ -108,7 +108,7 @@ class Render(LightTest):
         lacks = "without light tracing the image lacks visible caustics"
         render = ("render", "point.xml", *SMALL, "-o", "a.exr", *IICV, "--spp", "24")
         self.assertIn(lacks, self.good(*render).stderr)
-        self.assertNotIn(lacks, self.good(*render, "--light-tracing", "on").stderr)
+        self.assertNotIn(lacks, self.good(*render, "--set", "light-tracing=on").stderr)
         self.assertNotIn(lacks, self.good(*render, "--integrator", "path").stderr)
         self.assertNotIn(lacks, self.good("render", CAUSTIC, *SMALL, "-o", "a.exr", *IICV, "--spp", "24").stderr)
         self.assertNotIn(lacks, self.good(*(word for word in render if word not in IICV)).stderr, "it traces light")

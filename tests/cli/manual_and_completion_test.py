@@ -55,7 +55,7 @@ class OneScreen(HelpTest):
         self.assertLessEqual(max(map(len, lines)), 100)
         shown = self.options_in("\n".join(lines))
         self.assertLessEqual(set(self.WANTED), set(shown))
-        self.assertNotIn("--cv-grid", shown)
+        self.assertNotIn("--set", shown)
         hidden = len({line for line in self.good("render", "--help-all").stdout.splitlines()
                       if re.match(r" +-", line)}) - len({line for line in lines if re.match(r" +-", line)})
         self.assertIn(f"{hidden} more options", lines[-1])
@@ -63,15 +63,34 @@ class OneScreen(HelpTest):
     def test_all_options(self):
         text = self.good("render", "--help-all").stdout
         self.assertLessEqual(max(map(len, text.splitlines())), 100)
-        self.assertLessEqual({"--cv-grid", "--split", "--penalty", "--oidn", *self.WANTED}, set(self.options_in(text)))
+        self.assertLessEqual({"--set", "--split", "--paper", "--oidn", *self.WANTED}, set(self.options_in(text)))
         lines = text.splitlines()
         for line, below in zip(lines, [*lines[1:], ""], strict=True):
             if re.match(r" {2,6}-", line):
                 self.assertTrue(re.search(r"\S  +\S", line) or below.startswith(27 * " "), line)
         headings = re.findall(r"^(\S.*):$", text, re.M)
         self.assertEqual(headings[:2], ["Arguments", "Options"])
-        self.assertLessEqual({"Sampling", "Integrator controlled-path", "Estimator"}, set(headings))
+        self.assertLessEqual({"Sampling", "Methods"}, set(headings))
         self.assertEqual(len(headings), len(set(headings)))
+
+    def test_parameters_of_methods(self):
+        """Comparisons and papers vary many numbers; all share one option, and the help of a method lists its own."""
+        self.assertLessEqual(len(self.options["render"]), 60)
+        of_iicv = self.good("help", "iicv").stdout
+        for line in ("covary render SCENE -o OUT.exr --estimator iicv", "Parameters (--set NAME=VALUE):",
+                     "  penalty=pilot|sample|asymmetric", "  --paper "):
+            self.assertIn("\n" + line, "\n" + of_iicv)
+        of_guided = self.good("help", "guided-path").stdout
+        self.assertIn("\n  nee=on|off", of_guided)
+        self.assertNotIn("cv-grid", of_guided)
+        self.assertLessEqual(max(map(len, (of_iicv + of_guided).splitlines())), 100)
+        self.bad(2, "no method has a parameter 'windwo'; did you mean 'window'?: expected ", "render", "x.xml", "-o",
+                 "x.exr", "--set", "windwo=3")
+        self.bad(2, "--set: 'window': expected NAME=VALUE, e.g. k=50", "render", "x.xml", "-o", "x.exr", "--set",
+                 "window")
+        for former, now in (("--k", "--set k=VALUE"), ("--live-port", "--live=PORT"), ("--pt", "--independent"),
+                            ("--relative-error", "--until relative=X")):
+            self.bad(2, f"unknown option '{former}': write {now}; see", "render", "x.xml", "-o", "x.exr", former, "9")
 
     def test_commands(self):
         text = self.good("--help").stdout

@@ -352,7 +352,7 @@ class Numbers(OutputsTest):
     def test_whole_numbers(self):
         combine = ("combine", "--crn", "a.exr", "--independent", "b.exr", "-o", "o.exr")
         for text in ("0x10", "1e2", "3.0", "three", "9223372036854775808", "2147483648"):
-            self.bad(2, f"--k: '{text}': expected a whole number", *combine, f"--k={text}")
+            self.bad(2, f"--set k: '{text}': expected a whole number", *combine, "--set", f"k={text}")
         for text in ("0", "4097", "-1", "0x2", "18446744073709551617"):
             self.bad(2, f"--threads: '{text}': expected a whole number from 1 to 4096", *combine, f"--threads={text}")
         self.bad(2, "--explain '-1,2': expected X,Y", *combine, "--explain=-1,2")
@@ -368,14 +368,14 @@ class Numbers(OutputsTest):
         self.write("crn.exr", film(1, groups=3, size=(8, 8)))
         self.write("pt.exr", film(2, groups=3, size=(8, 8), sampling="independent"))
         text = self.good("combine", "--crn", "crn.exr", "--independent", "pt.exr", "-o", "o.exr", "--force",
-                         "--quiet", "--k", "010",
+                         "--quiet", "--set", "k=010",
                          "--json", "-").stdout
-        self.assertEqual(json.loads(text)["estimator"], "iicv --k 10")
+        self.assertEqual(json.loads(text)["estimator"], "iicv --set k=10")
 
     def test_other_numbers(self):
         combine = ("combine", "--crn", "a.exr", "--independent", "b.exr", "-o", "o.exr")
         for text in ("nan", "inf", "-inf", "0x1p3", "1e999", "1.5x"):
-            self.bad(2, f"--ridge: '{text}': expected a number", *combine, f"--ridge={text}")
+            self.bad(2, f"--set ridge: '{text}': expected a number", *combine, "--set", f"ridge={text}")
             self.bad(2, f"--memory: '{text}': expected a number above 0", *combine, f"--memory={text}")
             self.bad(2, f"--time: '{text}': expected a positive number", "experiment", "quick", "-o", "o",
                      f"--time={text}")
@@ -391,18 +391,19 @@ class Numbers(OutputsTest):
 
     def test_names(self):
         combine = ("combine", "--crn", "a.exr", "--independent", "b.exr", "-o", "o.exr")
-        self.bad(2, "--penalty: 'foo': expected pilot, sample, asymmetric; see", *combine,
-                 "--penalty", "foo")
-        self.bad(2, "--penalty: '3': expected pilot", *combine, "--penalty", "3")
-        self.bad(2, "--penalty: 'sampel'; did you mean 'sample'", *combine, "--penalty", "sampel")
+        self.bad(2, "--set penalty: 'foo': expected pilot, sample, asymmetric; see", *combine,
+                 "--set", "penalty=foo")
+        self.bad(2, "--set penalty: '3': expected pilot", *combine, "--set", "penalty=3")
+        self.bad(2, "--set penalty: 'sampel'; did you mean 'sample'", *combine, "--set", "penalty=sampel")
         self.bad(2, "--estimator: 'none': expected mixture, iicv, cv-baseline, iduw", *combine, "--estimator", "none")
 
     def test_a_window_beyond_all_bounds(self):
         self.write("crn.exr", film(1, groups=3))
         self.write("pt.exr", film(2, groups=3, sampling="independent"))
-        result = self.bad(2, "--window: '2147483647': expected an odd whole number from 3 to 63", "combine", "--crn",
+        result = self.bad(2, "--set window: '2147483647': expected an odd whole number from 3 to 63", "combine",
+                          "--crn",
                           "crn.exr", "--independent",
-                          "pt.exr", "-o", "o.exr", "--window", "2147483647")
+                          "pt.exr", "-o", "o.exr", "--set", "window=2147483647")
         self.assertNotIn("k is", result.stderr)
 
 

@@ -36,7 +36,7 @@ class Progress(CliTest):
         self.assertNotIn("training", text)
         self.assertNotIn("room: ", text[text.index("a.exr: "):])
         text = self.shown(*RENDER, "--spp", "8", "--denoise", "balanced", "--integrator", "guided-path",
-                          "--guiding-train", "4", "-o", "b.exr")
+                          "--set", "guiding-train=4", "-o", "b.exr")
         self.in_order(text, "loading", "training", "auxiliary images", "samples", "denoising", "writing")
         text = self.shown(*RENDER, "--estimator", "iicv", "--spp", "8", "-o", "c.exr", "--passes", "films")
         self.in_order(text, "loading", "samples", "combining", "writing")

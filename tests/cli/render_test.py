@@ -73,7 +73,7 @@ class RareLight(RenderTest):
         (self.path / "window.xml").write_text(WINDOW_ROOM)
         self.render("reference.exr", "--estimator", "none", "--spp", "1024", "--seed", "9")
         self.render("plain.exr", "--estimator", "none", "--spp", "24")
-        for options in (IICV, (*IICV, "--paper"), ("--estimator", "cv-baseline", "--ridge", "0.001")):
+        for options in (IICV, (*IICV, "--paper"), ("--estimator", "cv-baseline", "--set", "ridge=0.001")):
             self.render("a.exr", "--spp", "24", *options, "--passes", "films", "--overwrite")
             image, crn, independent = (read_exr((self.path / name).read_bytes())
                                        for name in ("a.exr", "films/crn.exr", "films/independent.exr"))
@@ -299,10 +299,10 @@ class Plans(RenderTest):
         self.bad(2, "iduw does not estimate its error", *render, "--until", "relmse=0.01", "--estimator", "iduw")
         self.bad(2, "--paper is an option of --estimator iicv, dependent-tests, not of cv-baseline", *render,
                  "--estimator", "cv-baseline", "--paper")
-        self.bad(2, "--k is an option of", *render, "--estimator", "none", "--k", "3")
+        self.bad(2, "--set k is an option of", *render, "--estimator", "none", "--set", "k=3")
         self.bad(2, "at least 3 groups", *render, *IICV, "--groups", "2")
         self.bad(2, "at least 4 groups", *render, "--groups", "3", "--estimator", "iduw")
-        self.bad(2, "window", *render, *IICV, "--window", "4")
+        self.bad(2, "window", *render, *IICV, "--set", "window=4")
 
     def test_predictions_from_few_samples_are_called_unreliable(self):
         words = "(unreliable: fewer than 48 samples per pixel)"
@@ -468,7 +468,8 @@ class Polynomials(RenderTest):
         self.bad(2, "--groups: polynomials are fitted to the samples of a pixel themselves", *render, "--groups", "4")
         self.bad(2, "--until: polynomials does not estimate its error", *render, "--until", "relmse=0.1")
         self.bad(2, "so their number must be known; use --spp", *render, "--time", "1")
-        self.bad(2, "--k is an option of --estimator iicv, cv-baseline, not of polynomials", *render, "--k", "3")
+        self.bad(2, "--set k is an option of --estimator iicv, cv-baseline, not of polynomials", *render,
+                 "--set", "k=3")
         self.bad(2, "15 samples per pixel are too few to fit the 15 coefficients of 4 dimensions, expected at least 16",
                  *render, "--spp", "15")
         self.bad(2, "polynomials are fitted to the samples of each pixel, which images do not hold", "combine", "--crn",
@@ -491,8 +492,8 @@ class Time(RenderTest):
     def test_rendering_leaves_time_for_the_estimate(self):
         # Slow ones, so that the time left for the estimate is more than the noise of a busy machine; a render that
         # leaves none         # ends after the limit in every attempt.
-        slow = ("--k", "100", "--window", "21")
-        for estimator, *arguments in (("iicv", *slow), ("cv-baseline", *slow), ("iduw", "--window", "21")):
+        slow = ("--set", "k=100", "--set", "window=21")
+        for estimator, *arguments in (("iicv", *slow), ("cv-baseline", *slow), ("iduw", "--set", "window=21")):
             with self.subTest(estimator):
                 limit, attempts = 1, []
                 while len(attempts) < 3:

@@ -143,9 +143,9 @@ def of_code(words, tree):
 
 def of_options(words, tree):
     for word in words.split():
-        name = word.lstrip("-").split("=")[0]
-        if re.fullmatch(r"[a-z][a-z0-9-]*", name) and name not in tree.literals():
-            yield f"the program has no {word}"
+        for name in word.lstrip("-").split("="):
+            if re.fullmatch(r"[a-z][a-z0-9-]*", name) and name not in tree.literals():
+                yield f"the program has no {word}"
 
 
 def target(page, link, tree):

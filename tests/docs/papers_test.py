@@ -12,7 +12,7 @@ SOURCE = Path(os.environ["SOURCE"])
 PAGES = sorted(path for path in (SOURCE / "docs" / "papers").glob("*.md") if path.name != "index.md")
 RIGHT = """# Page
 
-- **Eq. (1)**. *As described*: `solve` and `Grid::key` in `sums/solver.cpp`, `--ridge 0`, `--penalty pilot`;
+- **Eq. (1)**. *As described*: `solve` and `Grid::key` in `sums/solver.cpp`, `--set ridge=0 --set penalty=pilot`;
   `Solver.IsExact`, `covary experiment table1`; [gain 2.5, error 1,536](../notes/method.md#by-scene).
 
 | | [ours][scenes] |
@@ -34,7 +34,7 @@ class Planted(unittest.TestCase):
         self.root = Path(holder.name)
         for path, text in {
             "src/sums/solver.cpp": '// removed\nclass Grid { int key(); };\nint solve() { ask("ridge", "pilot"); }\n'
-                                   'ask("penalty");\n',
+                                   'ask("--set", "penalty");\n',
             "src/sums/solver_test.cpp": "TEST(Solver, IsExact) {}\n",
             "suites/table1.json": "{}\n",
             "docs/notes/method.md": "# Method\n\n## By scene\n\n| Door | 2.5 | 1536 |\n\n## More\n\n7.5\n",
@@ -59,8 +59,9 @@ class Planted(unittest.TestCase):
             ("Solver.IsExact", "Solver.IsFast", "page.md:3: there is no test Solver.IsFast"),
             ("experiment table1`", "experiment table2`", "page.md:3: there is no suite table2"),
             ("experiment table1 ", "experiment table2 ", "page.md:0: there is no suite table2"),
-            ("--ridge", "--bridge", "page.md:3: the program has no --bridge"),
-            ("penalty pilot", "penalty pirate", "page.md:3: the program has no pirate"),
+            ("--set ridge", "--sets ridge", "page.md:3: the program has no --sets"),
+            ("ridge=0", "bridge=0", "page.md:3: the program has no bridge=0"),
+            ("penalty=pilot", "penalty=pirate", "page.md:3: the program has no penalty=pirate"),
             ("gain 2.5", "gain 7.5", "page.md:3: ../notes/method.md#by-scene has no 7.5"),
             ("Door | 2.5", "Door | 7.5", "page.md:8: ../notes/method.md#by-scene has no 7.5"),
             ("#by-scene", "#by-light", "page.md:3: ../notes/method.md has no section #by-light"),

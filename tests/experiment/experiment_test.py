@@ -224,7 +224,7 @@ class Kinds(ExperimentTest):
     def test_training_counts(self):
         """A method that learns takes no more samples than the others, and its training is part of its time."""
         self.suite["methods"][1] = {"name": "learns", "options": ["--estimator", "none", "--integrator",
-                                                                  "controlled-path", "--cv-train", "8"]}
+                                                                  "controlled-path", "--set", "cv-train=8"]}
         self.suite["budgets"], self.suite["seeds"] = [{"spp": 24}], 1
         learns = next(c for c in self.results()["cells"] if c["method"] == "learns")
         self.assertEqual(learns["samples_per_pixel"], 24)
@@ -357,7 +357,7 @@ class Resume(ExperimentTest):
         self.assertEqual(len(self.results("--reference-spp", "64", code=1, **without)["failures"]), 1)
 
     def test_passes_are_shared(self):
-        self.suite["methods"] += [{"name": "paper", "options": ["--estimator", "iicv", "--paper", "--k", "9"]},
+        self.suite["methods"] += [{"name": "paper", "options": ["--estimator", "iicv", "--paper", "--set", "k=9"]},
                                   {"name": "iduw", "options": ["--estimator=iduw"]},
                                   {"name": "other split", "options": ["--estimator", "iicv", "--split", "3:1"]},
                                   {"name": "polynomials", "options": ["--estimator", "polynomials"]}]
@@ -482,8 +482,8 @@ class Mistakes(ExperimentTest):
     def test_methods_that_render_refuses(self):
         refused = ((["--estimator", "iidw"], "'iidw'; did you mean 'iduw' or 'iicv'?: expected mixture, iicv"),
                    (["--windwo", "3"], "--windwo"),
-                   (["--estimator", "iduw", "--k", "3"], "--k is an option of --estimator iicv, cv-baseline"),
-                   (["--k", "-3"], "--k: '-3': expected a whole number of at least 1"))
+                   (["--estimator", "iduw", "--set", "k=3"], "--set k is an option of --estimator iicv, cv-baseline"),
+                   (["--set", "k=-3"], "--set k: '-3': expected a whole number of at least 1"))
         for options, message in refused:
             with self.subTest(options):
                 self.suite["methods"] = [*SUITE["methods"], {"name": "wrong", "options": options}]
@@ -577,7 +577,7 @@ class Foreign(ExperimentTest):
         self.suite["methods"].append(
             {"name": "all", "then": [["denoise", "--clean-guides"]],
              "options": ["--denoise", "balanced", "--oidn", "off", "--split", "1:3", "--until", "relmse=0.1", "--crop",
-                         "0,0,8,8", "-D", "a=b", "--k", "3", "--integrator", "path", "--aovs"]})
+                         "0,0,8,8", "-D", "a=b", "--set", "k=3", "--integrator", "path", "--aovs"]})
         done = self.run_covary(self.command("--print"))
         self.assertEqual((done.returncode, done.stderr), (0, ""))
 

@@ -211,7 +211,7 @@ class Picture(LiveTest):
 
     def test_adaptive_pairs_are_combined_on_the_way(self):
         """The filtered and combined image of dependent tests, while its second pass goes on."""
-        program = self.start("--estimator", "dependent-tests", "--paper", "--dependent-spp", "8", "--spp", ENDLESS)
+        program = self.start("--estimator", "dependent-tests", "--paper", "--set", "dependent-spp=8", "--spp", ENDLESS)
         state = program.until(lambda state: len(state["pictures"]) == 2 and "samples" in state["pictures"][1]["label"])
         self.assertEqual([p["name"] for p in state["pictures"]], ["Mean", "Image"])
         self.assertNotIn("ended", state)
@@ -453,11 +453,11 @@ class Options(LiveTest):
         program = self.start("--spp", ENDLESS)
         port = program.port
         program.end()
-        other = Program(self.folder, "render", ROOM, "-o", "b.exr", "--spp", ENDLESS, "--live-port", str(port))
+        other = Program(self.folder, "render", ROOM, "-o", "b.exr", "--spp", ENDLESS, f"--live={port}")
         self.addCleanup(other.end)
         self.assertEqual(other.port, port)
         self.assertEqual(other.ask(f"/{other.token}/", Host=f"localhost:{port + 1}")[0], 200)
-        result = subprocess.run([os.environ["COVARY"], "render", ROOM, "-o", "c.exr", "--live-port", str(port)],
+        result = subprocess.run([os.environ["COVARY"], "render", ROOM, "-o", "c.exr", f"--live={port}"],
                                 cwd=self.folder, capture_output=True, text=True)
         self.assertIn(f"no page can be served at 127.0.0.1:{port}: Address already in use", result.stderr)
         self.assertNotEqual(result.returncode, 0)

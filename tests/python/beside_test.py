@@ -37,7 +37,7 @@ class Light(BesideTest):
 
     def setUp(self):
         super().setUp()
-        self.run_program("render", ROOM, "-o", "whole.exr", *SIZE, "--integrator", "bdpt", "--light-tracing", "on",
+        self.run_program("render", ROOM, "-o", "whole.exr", *SIZE, "--integrator", "bdpt", "--set", "light-tracing=on",
                          "--spp", 24, "--max-depth", 3, "--estimator", "iicv", "--passes", ".", "--quiet",
                          "--no-preview")
         self.films = {name: covary.Film.load(self.path / f"{name}.exr") for name in ("crn", "independent", "light")}

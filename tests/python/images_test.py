@@ -46,7 +46,7 @@ class Combine(FilesTest):
         message = self.message_of(covary.InputError, covary.combine, self.independent, self.crn)
         self.assertEqual(message.replace("force=True", "--force"), swapped)
         wrong = self.failure_of_program("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o",
-                                        "x.exr", "--k", "500")
+                                        "x.exr", "--set", "k=500")
         self.assertEqual(self.message_of(covary.UsageError, covary.combine, self.crn, self.independent, k=500),
                          wrong)
 
@@ -71,9 +71,9 @@ class Estimators(FilesTest):
         self.assert_same_bits(covary.iicv(self.crn, self.independent).image,
                               covary.combine(self.crn, self.independent, "iicv").image)
         result = covary.iicv(self.crn, self.independent, paper=True, k=9)
-        self.assertEqual(result.estimator, "iicv --paper --k 9")
+        self.assertEqual(result.estimator, "iicv --paper --set k=9")
         self.assertEqual(covary.cv_baseline(self.crn, self.independent, ridge=0.5).estimator,
-                         "cv-baseline --ridge 0.5")
+                         "cv-baseline --set ridge=0.5")
         self.assertIsNone(covary.iduw(self.crn, self.independent, samples=96).std_error)
         self.assertIsNone(covary.iduw(self.crn, self.independent, samples=96).bias)
 

@@ -53,7 +53,7 @@ class Render(PackageTest):
         self.same(covary.render(scene, 6, "none", seed=5, filter="tent"), "--spp", 6, "--estimator", "none", "--seed",
                   5, "--rfilter", "tent")
         self.same(covary.render(scene, 24, "iicv", k=9, split=(1, 2), groups=4), "--spp", 24, "--estimator", "iicv",
-                  "--k", 9, "--split", "1:2", "--groups", 4)
+                  "--set", "k=9", "--split", "1:2", "--groups", 4)
         self.same(covary.render(scene, 8, "none", sampler="sobol"), "--spp", 8, "--estimator", "none", "--sampler",
                   "sobol")
         self.same(covary.render(scene, 24, "iicv", integrator="controlled-path", aovs=True), "--spp", 24,
@@ -62,7 +62,7 @@ class Render(PackageTest):
     def test_bidirectional_with_properties(self):
         scene = self.scene(integrator="bdpt", integrator_options={"light_tracing": "off"}, max_depth=3)
         self.same(covary.render(scene, 8, "none"), "--spp", 8, "--estimator", "none", "--integrator", "bdpt",
-                  "--light-tracing", "off", "--max-depth", 3)
+                  "--set", "light-tracing=off", "--max-depth", 3)
 
     def test_until(self):
         result = covary.render(self.scene(), spp=400, until=0.05)
@@ -291,7 +291,7 @@ class BadSamples(PackageTest):
         scene = covary.Scene.load(self.file, integrator="bdpt")
         with self.assertWarns(covary.BadSamplesWarning):
             of_iicv = covary.render(scene, 24, "iicv")
-        self.assertIn("--light-tracing off --", of_iicv.bad_samples[-1].replay)
+        self.assertIn("--set light-tracing=off --", of_iicv.bad_samples[-1].replay)
         self.assertIn("inf", self.replayed(of_iicv.bad_samples[-1]))
 
 
