@@ -150,7 +150,7 @@ void require_memory_of_network(const Options& o, const CropWindow& window) {
   if (o.memory_mib && bytes > *o.memory_mib * kMebibyte)
     throw Error(
         ErrorCode::kUsage,
-        fmt::format("{}: an image of {} x {} pixels needs {} of memory for Open Image Denoise; permitted are {} "
+        fmt::format("{}: an image of {} x {} pixels needs {} of memory for Open Image Denoise; {} are allowed "
                     "(--memory)",
                     o.inputs[0], window.width, window.height, bytes_text(bytes),
                     bytes_text(*o.memory_mib * kMebibyte)));
@@ -288,7 +288,7 @@ void check_options(const Options& o) {
   if (o.inputs.size() > 1 && is_by_network(o))
     usage("--mode oidn and --clean-guides are for one image; covary merge makes one of films");
   if (o.clean_guides && !is_by_network(o))
-    usage("--clean-guides is an option of --mode oidn; mixtures always denoise their guides first");
+    usage("--clean-guides is an option of --mode oidn; mixtures always denoise their auxiliary features first");
 }
 
 /// Returns what to say about the result.
@@ -375,10 +375,10 @@ void add_denoise(CLI::App& app) {
       "Layers of the inputs to denoise with the picture's weights, so that with Rest they add up to it; 'all': those "
       "of lights, and of direct and indirect light, that Blender and Arnold write")
       ->delimiter(',');
-  command->add_flag("--no-guides", o->no_guides, "Do not use guides");
+  command->add_flag("--no-guides", o->no_guides, "Do not use auxiliary features");
   command->add_flag(
       "--clean-guides", o->clean_guides,
-      "With --mode oidn, denoise the guides first: less error if they are noisy, in three times the time");
+      "With --mode oidn, denoise the auxiliary features first: less error if they are noisy, in three times the time");
   add_value(*command, "--json", o->json, kFileValue, "File for statistics of a mixture; '-': standard output");
   command->add_option("--memory", o->memory_mib, kMemoryHelp)->check(positive_number());
   add_frame_options(*command, o->of_frames, "Denoise");

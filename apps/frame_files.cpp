@@ -111,10 +111,10 @@ void add_frame_options(CLI::App& command, FrameOptions& o, const std::string& wh
   add_value(command, "--depth", o.motion.depth, "LAYER", "Layer with the depth, if any")->capture_default_str();
   add_value(command, "--motion-scale", o.motion_scale, "X,Y",
             "Factors that turn motion into pixels to the right and down; 1,-1 if Y points up");
-  command.add_flag("--resume", o.resume, "Of in_####.exr, leave out frames whose output is there already");
+  command.add_flag("--resume", o.resume, "Of in_####.exr, skip frames whose output exists");
   command.add_flag("--watch", o.watch,
-                   "Of in_####.exr, wait for frames and treat each when its files are complete, until all of --frames "
-                   "are done, --idle or Ctrl-C");
+                   "Of in_####.exr, wait for frames and process each when its files are complete, until all of "
+                   "--frames are done, --idle or Ctrl-C");
   command.add_option("--idle", o.idle, "With --watch, end after so many seconds without a new frame")
       ->check(positive_number());
   command.add_flag("--no-history", o.no_history, what + " each frame alone");
@@ -182,7 +182,7 @@ void note_gaps(const FrameOptions& o, const std::vector<int>& frames, const Fram
     if (others.empty()) continue;
     const size_t more = others.size() - std::min(others.size(), kMostNamed);
     others.resize(others.size() - more);
-    fmt::print(stderr, "note: {}{} beside '{}' are not its frames: numbers have other digits\n",
+    fmt::print(stderr, "note: {}{} beside '{}' are not its frames: their numbers have another number of digits\n",
                fmt::join(others, ", "), more > 0 ? fmt::format(" and {} more", more) : "", pattern);
   }
 }
@@ -209,10 +209,10 @@ struct HistorySource {
     motion = motion_pattern(source, patterns, frames[0]);
     const std::optional<std::string> only = layer_with_history(patterns, frames[0]);
     if (!motion && !o.quiet)
-      fmt::print(stderr, "note: the frames have no layer '{}' (--motion); each is treated alone, without history\n",
+      fmt::print(stderr, "note: the frames have no layer '{}' (--motion); each is denoised alone, without history\n",
                  source.motion);
     else if (!only && !o.quiet)
-      fmt::print(stderr, "note: the frames have several pictures; each is treated alone, without history\n");
+      fmt::print(stderr, "note: the frames have several pictures; each is denoised alone, without history\n");
     if (!only) motion.reset();
     layer = only.value_or("");
   }
@@ -270,7 +270,7 @@ class Frames {
   void finish() const {
     if (!o_.quiet)
       fmt::print(stderr, "{} frames in {:.1f} s{}\n", n_done_, watch_.seconds(),
-                 kept_.empty() ? "" : fmt::format("; {} were there already: {}", kept_.size(), text_of(kept_)));
+                 kept_.empty() ? "" : fmt::format("; {} existed already: {}", kept_.size(), text_of(kept_)));
     if (!failed_.empty())
       throw Error(ErrorCode::kInput, fmt::format("{} of {} frames failed: {}", failed_.size(),
                                                  n_done_ + kept_.size() + failed_.size(), text_of(failed_)));

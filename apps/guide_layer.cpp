@@ -69,7 +69,7 @@ void leave_out_bad_pixels(const std::string& name, Image& guide) {
     std::fill_n(pixel, 3, std::numeric_limits<float>::quiet_NaN());
   }
   if (n > 0)
-    fmt::print(stderr, "warning: {}: {} of {} pixels of this guide are left out, the first with the value {}\n",
+    fmt::print(stderr, "warning: {}: {} of {} pixels of this feature are left out, the first with the value {}\n",
                printable(name), n, guide.data.size() / 3, first);
 }
 
@@ -196,7 +196,7 @@ Guides GuideLayers::view() const {
 }
 
 const char* GuideLayers::text() const {
-  return normal ? "guided by albedo and normal" : albedo ? "guided by albedo" : "without guides";
+  return normal ? "guided by albedo and normal" : albedo ? "guided by albedo" : "without auxiliary features";
 }
 
 }  // namespace covary

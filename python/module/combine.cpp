@@ -181,7 +181,7 @@ struct GuideImages {
       if (array.is_none()) return;
       if (!estimator.reads_guides)
         throw Error(ErrorCode::kUsage, std::string(name) +
-                                           ": guides are of denoising, with denoise='auto', "
+                                           ": auxiliary features are for denoising, with denoise='auto', "
                                            "'bias', 'balanced' or 'error'");
       to = image_of(array, name, shape);
     };
@@ -192,7 +192,7 @@ struct GuideImages {
     take(beside.position, "position", position);
     const auto needs = [](const Image& guide, const Image& other, const char* name, const char* other_name) {
       if (guide.data.empty() || !other.data.empty()) return;
-      throw Error(ErrorCode::kUsage, fmt::format("{}: it is a guide only together with {}", name, other_name));
+      throw Error(ErrorCode::kUsage, fmt::format("{}: it has an effect only together with {}", name, other_name));
     };
     needs(normal, albedo, "normal", "the albedo");
     needs(position, albedo, "position", "the albedo");

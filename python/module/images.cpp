@@ -79,7 +79,7 @@ nb::object denoised(nb::object image, nb::object albedo, nb::object normal, cons
   if (!albedo.is_none()) a = image_of(albedo, "albedo");
   if (!normal.is_none()) n = image_of(normal, "normal");
   if (a.data.empty() && !n.data.empty())
-    throw Error(ErrorCode::kUsage, "normal: it is a guide only together with the albedo");
+    throw Error(ErrorCode::kUsage, "normal: it has an effect only together with the albedo");
   check_guide("albedo", a);
   check_guide("normal", n);
   Image result;

@@ -59,7 +59,7 @@ void check_memory(const CombineRequest& request, double planned) {
               fmt::format("{} x {} pixels of {} need {} of memory for {}{}; {}", request.independent.width,
                           request.independent.height, inputs_text(request), bytes_text(planned), request.estimator.text,
                           needs_whole(request) ? ", which works on whole images" : "",
-                          request.most_memory ? "permitted are " + bytes_text(*request.most_memory) + " (`memory`)"
+                          request.most_memory ? bytes_text(*request.most_memory) + " are allowed (`memory`)"
                                               : memory_limit_text()));
 }
 

@@ -274,8 +274,8 @@ void check_guide(const std::string& name, const Image& guide) {
   const auto it = std::find_if(guide.data.begin(), guide.data.end(), [](float v) { return !std::isfinite(v); });
   if (it == guide.data.end()) return;
   const auto pixel = static_cast<int>((it - guide.data.begin()) / guide.channels);
-  throw Error(ErrorCode::kInput, fmt::format("{} holds the value {} at pixel ({}, {}); all values of a guide must be "
-                                             "finite",
+  throw Error(ErrorCode::kInput, fmt::format("{} holds the value {} at pixel ({}, {}); all values of auxiliary "
+                                             "features must be finite",
                                              name, *it, pixel % guide.width, pixel / guide.width));
 }
 

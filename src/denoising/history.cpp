@@ -160,7 +160,7 @@ void follow_features(History& history, const Image& albedo, const Image& normal)
   if (history.features.data.empty()) return;
   for (const Image* image : {&albedo, &normal})
     if (image->data.size() != history.image.data.size())
-      throw Error(ErrorCode::kInput, "the guides have another size than the history");
+      throw Error(ErrorCode::kInput, "the auxiliary features have another size than the history");
   parallel_for(history.known.size(), 1024, [&](size_t i) {
     if (!history.known[i]) return;
     const float* const before = &history.features.data[kHistoryFeatures * i];

@@ -56,11 +56,11 @@ int runs_of(const std::vector<CandidateMaker>& makers) {
 }
 
 void check_guides(const Guides& guides) {
-  if (guides.albedo) check_guide("the guide albedo", *guides.albedo);
-  if (guides.normal) check_guide("the guide normal", *guides.normal);
-  if (guides.denoising_albedo) check_guide("the guide albedo behind glass", *guides.denoising_albedo);
-  if (guides.denoising_normal) check_guide("the guide normal behind glass", *guides.denoising_normal);
-  if (guides.position) check_guide("the guide position", *guides.position);
+  if (guides.albedo) check_guide("the albedo", *guides.albedo);
+  if (guides.normal) check_guide("the normal", *guides.normal);
+  if (guides.denoising_albedo) check_guide("the albedo behind glass", *guides.denoising_albedo);
+  if (guides.denoising_normal) check_guide("the normal behind glass", *guides.denoising_normal);
+  if (guides.position) check_guide("the position", *guides.position);
 }
 
 }  // namespace

@@ -91,7 +91,7 @@ inline void declare(Settings& s, ControlSettings& v) {
       {"absolute", VarianceKind::kAbsolute}};
   s.group("Integrator controlled-path", OptionEffect::kSamples);
   if (s.preset("cv-paper")) v = ControlSettings::published();
-  s.choice("cv", v.kind, kControlKinds, "Coefficients: per channel, one, of light samples only, per pixel",
+  s.choice("cv", v.kind, kControlKinds, "Coefficients: per channel, one, of NEE only, per pixel",
            {.film = "cv={}"});
   s.choice("lights", v.lights, kSelections, "How lights are chosen: by triangle, shape, power, or as learnt",
            {.film = "lights={}"});

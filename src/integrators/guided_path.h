@@ -45,7 +45,7 @@ inline void declare(Settings& s, GuideSettings& v) {
           "Samples per leaf; leaves with more are split", {.film = "leaf={}"});
   s.whole("guiding-train", v.train_spp, {.low = 1, .high = GuideSettings::kMaxTrainingSpp},
           "Training samples per pixel, included in `spp`", {.film = "train={}"});
-  s.on_off("nee", v.nee, "Light samples at each vertex (next-event estimation)", {.film = "nee={}"});
+  s.on_off("nee", v.nee, "Next-event estimation (NEE) at each vertex", {.film = "nee={}"});
   s.choice("cv", v.control, kControls, "Control variates on the lobes", {.film = "cv={}"});
   s.whole("cv-train", v.control_train_spp, {.low = 1, .high = GuideSettings::kMaxTrainingSpp},
           "Training samples per pixel for their coefficients, after those for the lobes", {.film = "cv_train={}"});

@@ -209,7 +209,7 @@ std::vector<const Summary*> comparable(const Results& results, size_t budget) {
   return all;
 }
 
-/// "At equal samples (192 spp) balanced has the least error: 8.1 times less than pt (7.0 to 9.4). Not clearly worse:
+/// "At equal samples (192 spp) balanced has the lowest error: 8.1 times lower than pt (7.0 to 9.4). Not clearly worse:
 /// error." Empty if nothing is significantly better than the baseline.
 std::string verdict(const Results& results, size_t budget, const std::string& condition, Estimate Summary::*ratio) {
   const Suite& suite = results.suite;
@@ -224,7 +224,7 @@ std::string verdict(const Results& results, size_t budget, const std::string& co
   if (!(gain.value > 1))
     return fmt::format("{} no method has less error than '{}'; next is '{}', with {:.2g} times as much.", condition,
                        suite.baseline, suite.methods[best->method].name, 1 / gain.value);
-  std::string text = fmt::format("{} '{}' has the least error: {:.2g} times less than '{}'", condition,
+  std::string text = fmt::format("{} '{}' has the lowest error: {:.2g} times lower than '{}'", condition,
                                  suite.methods[best->method].name, gain.value, suite.baseline);
   if (!std::isfinite(gain.low)) return text + ".";
   text += fmt::format(" ({:.2g} to {:.2g}).", gain.low, gain.high);

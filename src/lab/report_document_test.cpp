@@ -261,12 +261,12 @@ TEST(ReportDocument, SaysWhichMethodHasTheLeastError) {
   EXPECT_EQ(
       verdicts(results, 0),
       (std::vector<std::string>{
-          "At equal samples (24 spp) 'iicv' has the least error: 4 times less than 'pt' (3.5 to 4.5). Not clearly "
+          "At equal samples (24 spp) 'iicv' has the lowest error: 4 times lower than 'pt' (3.5 to 4.5). Not clearly "
           "worse: 'crn'.",
           "At equal time no method has less error than 'pt'; next is 'crn', with 1.2 times as much."}))
       << "a method that lacks a scene does not count";
   EXPECT_EQ(verdicts(results, 1),
-            std::vector<std::string>{"At equal time (10 s) 'iicv' has the least error: 2 times less than 'pt'."});
+            std::vector<std::string>{"At equal time (10 s) 'iicv' has the lowest error: 2 times lower than 'pt'."});
 }
 
 TEST(ReportDocument, ShowsTheBudgetOfTheSuite) {

@@ -159,7 +159,7 @@ void PlanRun::plan_time_limit() {
   plan.seconds += between;
   if (plan.seconds > left && callbacks_.warning)
     callbacks_.warning(fmt::format(
-        "`time` {:g} is too short: the least takes about {:.2g} s ({}{:.2g} for {} samples per pixel, {:.2g} for the "
+        "`time` {:g} is too short: the minimum takes about {:.2g} s ({}{:.2g} for {} samples per pixel, {:.2g} for the "
         "image and its files)",
         request_.seconds, watch_.seconds() + plan.seconds,
         costs_.auxiliary > 0 ? fmt::format("{:.2g} for auxiliary images, ", plan.aov_samples * costs_.auxiliary) : "",

@@ -69,7 +69,7 @@ MotionLayers read_motion(const std::string& path, const MotionSource& source) {
   if (!found) {
     std::vector<std::string> all;
     for (const ExrFile::Channel& channel : file.channels()) all.push_back(channel.name);
-    throw Error(ErrorCode::kInput, fmt::format("{}: no layer '{}' of motion; there are the channels {}", path,
+    throw Error(ErrorCode::kInput, fmt::format("{}: no layer '{}' of motion; it has the channels {}", path,
                                                source.motion, fmt::join(all, ", ")));
   }
   std::vector<ExrPlane> planes;

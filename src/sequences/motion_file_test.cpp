@@ -80,7 +80,7 @@ TEST_F(MotionFile, WithoutMotionIsAnError) {
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kInput);
-    EXPECT_NE(std::string(error.what()).find("no layer 'Motion' of motion; there are the channels R, Vector.X"),
+    EXPECT_NE(std::string(error.what()).find("no layer 'Motion' of motion; it has the channels R, Vector.X"),
               std::string::npos);
   }
 }

@@ -162,9 +162,9 @@ class Combine(CliTest):
         self.assertLess(bands["planned_memory_bytes"], 150 << 20)
         self.assertLess(bands["peak_memory_bytes"], 200e6)
         self.bad(2, "800 x 600 pixels of 12 + 12 groups need 217.4 MB of memory for iduw, which works on whole "
-                 "images; permitted are 157.3 MB (--memory)", *large, "--estimator", "iduw", "--memory", "150")
+                 "images; 157.3 MB are allowed (--memory)", *large, "--estimator", "iduw", "--memory", "150")
         balanced = (*large, *IICV, "--denoise", "balanced", "--oidn", "off", "--memory")
-        self.bad(2, "of memory for iicv --denoise balanced --oidn off; permitted are 209.7 MB", *balanced, "200")
+        self.bad(2, "of memory for iicv --denoise balanced --oidn off; 209.7 MB are allowed", *balanced, "200")
         self.assertLess(json.loads(self.good(*balanced, "440").stdout)["peak_memory_bytes"], 440 << 20)
         self.bad(2, "the limit is 200.0 MB: use less, or raise it by the environment variable COVARY_MEMORY",
                  *large, "--estimator", "iduw", env=os.environ | {"COVARY_MEMORY": "0.2"})

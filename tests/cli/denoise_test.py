@@ -128,7 +128,7 @@ class Denoise(RenderTest):
                 bad = {**layers, name: [0.5] * (width + 3) + [value] + [0.5] * (width * (height - 1) - 4)}
                 self.write("guides.exr", exr({**bad, **{c: [0.5] * (width * height) for c in "RGB"}}, (width, height)))
                 said = self.good(*inputs, "--denoise", "error", *PLAIN, "--guides", "guides.exr").stderr
-                self.assertIn(f"guides.exr: the layer {layer}: 1 of {width * height} pixels of this guide are left "
+                self.assertIn(f"guides.exr: the layer {layer}: 1 of {width * height} pixels of this feature are left "
                               f"out, the first with the value {value} at (3, 1)", said)
             seen = {f"{layer}.{c}": [0.5] * (width * height) for layer, names in (("DenoisingAlbedo", "RGB"),
                                                                                  ("DenoisingNormal", "XYZ"))

@@ -119,7 +119,7 @@ class Views(PicturesTest):
         self.pair(self.make)
         said = self.denoise()
         self.assertRegex(said, r"o.exr \(left\): 40 x 24, .* guided by albedo")
-        self.assertRegex(said, r"o.exr \(right\): 40 x 24, .* without guides")
+        self.assertRegex(said, r"o.exr \(right\): 40 x 24, .* without auxiliary features")
         found = self.read()
         self.assertLess(self.error(found["left.R"]), 0.05)
         self.assertLess(self.error([v / 2 for v in found["right.R"]]), 0.05)
@@ -143,7 +143,7 @@ class Views(PicturesTest):
         self.pair(lambda seed: {**colours("A.Combined", noisy(seed)), **colours("B.Combined", noisy(10 + seed)),
                                 **colours("B.Denoising Albedo", floats([0.5] * N))})
         said = self.denoise()
-        self.assertRegex(said, r"\(A.Combined\): .* without guides")
+        self.assertRegex(said, r"\(A.Combined\): .* without auxiliary features")
         self.assertRegex(said, r"\(B.Combined\): .* guided by albedo")
         self.assertNotIn("(A.Combined)", self.denoise("--layer", "B"))
 
@@ -204,8 +204,8 @@ class WrongValues(PicturesTest):
                         **{f"{layer}.{c}": v for layer, v in (("sh_normal", normal), ("P", position)) for c in "XYZ"}}
             self.pair(make)
             said = self.denoise()
-            self.assertIn(f"warning: b.exr: the layer sh_normal: 1 of {N} pixels of this guide are left out, the first "
-                          f"with the value {value} at (7, 0)", said)
+            self.assertIn(f"warning: b.exr: the layer sh_normal: 1 of {N} pixels of this feature are left out, the "
+                          f"first with the value {value} at (7, 0)", said)
             self.assertIn("a.exr: the layer P: 1 of", said)
             self.assertIn("guided by albedo and normal", said)
             self.assertTrue(all(math.isfinite(v) for v in self.read()["R"]))
@@ -361,7 +361,7 @@ class Sequences(PicturesTest):
         self.good(*command, "--frames", "2")
         first = (self.path / "o.0002.exr").stat().st_mtime_ns
         said = self.good(*command).stderr
-        self.assertIn("; 1 were there already: 2\n", said)
+        self.assertIn("; 1 existed already: 2\n", said)
         self.assertEqual((self.path / "o.0002.exr").stat().st_mtime_ns, first)
         self.assertEqual(len(list(self.path.glob("o.*"))), 3)
         self.bad(2, "--resume: the input has no '#'", "denoise", "a.0001.exr", "-o", "p.exr", "--resume")

@@ -543,8 +543,8 @@ class Time(RenderTest):
             with self.subTest(options):
                 result = self.good("render", ROOM, "--resolution", "200x150", "-o", "a.exr", "--overwrite",
                                    "--time", "0.001", *options)
-                self.assertRegex(result.stderr, r"warning: --time 0.001 is too short: the least takes about [0-9.e-]+ "
-                                                r"s \(")
+                self.assertRegex(result.stderr, r"warning: --time 0.001 is too short: the minimum takes about "
+                                                r"[0-9.e-]+ s \(")
                 late = result.stderr.find("was exceeded")
                 self.assertTrue(late < 0 or result.stderr.index("too short") < late, result.stderr)
 

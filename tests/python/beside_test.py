@@ -133,8 +133,8 @@ class Denoise(BesideTest):
         self.assert_program_has(result, "--denoise", "error", "--oidn", denoiser, "--guides", "guides.exr")
         said = [self.message_of(covary.UsageError, covary.combine, *self.images, denoise="error", **guides)
                 for guides in ({"denoising_normal": self.normal}, {**first, "denoising_albedo": self.albedo})]
-        self.assertEqual(said, ["denoising_normal: it is a guide only together with denoising_albedo",
-                                "denoising_albedo: it is a guide only together with denoising_normal"])
+        self.assertEqual(said, ["denoising_normal: it has an effect only together with denoising_albedo",
+                                "denoising_albedo: it has an effect only together with denoising_normal"])
 
     def test_independent_image_alone(self):
         """Denoised, with layers that add up to it."""
@@ -159,7 +159,7 @@ class Denoise(BesideTest):
         self.assert_same_bits(placed.image.reshape(-1, 3), rgb(self.path / "out.exr"))
         self.assertEqual(self.message_of(covary.UsageError, covary.combine, None, independent, denoise="auto",
                                          position=position),
-                         "position: it is a guide only together with the albedo")
+                         "position: it has an effect only together with the albedo")
         self.assertIn("crn: found None; without it, independent images can only be denoised",
                       self.message_of(covary.UsageError, covary.combine, None, independent,
                                       denoise="none"))
@@ -174,7 +174,7 @@ class Denoise(BesideTest):
         self.write("guides", {f"Albedo.{c}": self.albedo[:, :, i] for i, c in enumerate("RGB")})
         self.assertIn("option of --denoise auto, bias", self.failure_of_program(*FILES, "--estimator", "iicv",
                                                                             "--guides", "guides.exr"))
-        self.assertIn("albedo: guides are of denoising",
+        self.assertIn("albedo: auxiliary features are for denoising",
                       message(covary.UsageError, albedo=self.albedo))
         self.assertEqual(message(covary.UsageError, oidn="off"),
                          self.failure_of_program(*FILES, "--estimator", "iicv", "--oidn", "off").replace("--", ""))
@@ -188,7 +188,7 @@ class Denoise(BesideTest):
             guides = {"albedo": self.albedo, "normal": self.normal}
             guides[guide] = guides[guide].copy()
             guides[guide][2, 5, 1] = math.nan
-            self.assertIn(f"the guide {guide} holds the value nan at pixel (5, 2); all values of a guide must be "
+            self.assertIn(f"the {guide} holds the value nan at pixel (5, 2); all values of auxiliary features must be "
                           "finite", message(covary.InputError, denoise="bias", oidn="off", **guides))
         self.assertIn("blured", message(covary.UsageError, denoise="blured"))
 
