@@ -107,7 +107,8 @@ def estimators_module(estimators):
     pairs = [e for e in estimators if e["passes"] == "pair"]
     head = HEAD.format("The estimators of two images by name, with their options.", ", Literal",
                        "from ._combine import combine\n\nif TYPE_CHECKING:\n    from os import PathLike\n\n"
-                       "    from ._combine import DenoiseMode, Progress\n    from ._result import Result\n"
+                       "    from ._combine import Progress\n    from ._keywords import DenoiseMode\n"
+                       "    from ._result import Result\n"
                        "    from .film import Film\n")
     names = sorted([identifier(e["name"]) for e in pairs])
     of_pairs = [e["name"] for e in estimators if e["is_default"] or e in pairs]
@@ -123,6 +124,10 @@ def arguments_of_render(source):
     return {argument.arg for argument in (*render.args.args, *render.args.kwonlyargs)} | under_other_names
 
 
+#: Types of arguments that several functions have, and the options whose choices they are.
+NAMED_CHOICES = {"DenoiseMode": "denoise", "Filter": "rfilter"}
+
+
 def keywords_module(lists, own):
     """For type checkers: the keywords that render() takes as declared options, besides its own arguments."""
     types = {}
@@ -135,7 +140,9 @@ def keywords_module(lists, own):
                       if name not in own)
     head = HEAD.format("Keywords of functions that take options.", ", Literal, TypedDict",
                        "if TYPE_CHECKING:\n    from os import PathLike\n\n")
-    return f"{head.replace(' Any,', '')}class RenderOptions(TypedDict, total=False):\n{lines}\n"
+    choices = {option["name"]: option["choices"] for options in lists for option in options}
+    names = "".join(f"{name} = {literal(choices[option])}\n" for name, option in NAMED_CHOICES.items())
+    return f"{head.replace(' Any,', '')}{names}\n\nclass RenderOptions(TypedDict, total=False):\n{lines}\n"
 
 
 METRIC = '''

@@ -58,7 +58,7 @@ def command(program: Path, files: Mapping[str, Sequence[str]], output: str, deno
         return [str(program), "denoise", "--force", "--overwrite", *files["independent"], "-o", output, "--json",
                 statistics]
     return [str(program), "combine", "--force", "--overwrite", "--crn", *files["crn"], "--independent",
-            *files["independent"], "-o", output, "--estimator", "iicv", "--denoise", denoise, "--json", statistics]
+            *files["independent"], "-o", output, "--denoise", denoise, "--json", statistics]
 
 
 def comparison(program: Path, image: str, other: str) -> list[str]:

@@ -5,23 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any
 
 from . import _covary
-from ._arguments import (Rule, array, check_some, checked, choice, empty_or, flag, function, mapping_of, optional, path,
+from ._arguments import (Rule, array, check_some, checked, empty_or, flag, function, mapping_of, optional, path,
                          text, whole)
-from ._options import DEFAULT, OptionValue, check_no_passes, text_options
+from ._options import DEFAULT, OptionValue, check_no_passes, declared_rules, text_options
 from ._result import Result
 from .errors import UsageError
 
 if TYPE_CHECKING:
+    from ._keywords import DenoiseMode
     from .estimators import PairEstimator
     from .film import Film
 
 Progress = Callable[[int, int], object]
-#: The values of `--denoise` on the command line.
-DenoiseMode = Literal["none", "auto", "bias", "balanced", "error"]
-DENOISE = choice(get_args(DenoiseMode))
+DENOISE = declared_rules(_covary.combine_options())["denoise"]
 OIDN = empty_or(path)
 #: The module checks these together with their pixels.
 IMAGE = Rule("a covary.Film or an array", array.convert)
@@ -29,7 +28,7 @@ _LAYERS = optional(mapping_of(IMAGE, "a mapping from names to arrays"))
 
 
 @checked(crn=IMAGE, independent=IMAGE, estimator=text, light=IMAGE, counts=array,
-         samples=optional(whole(1, _covary.most_samples)), denoise=optional(DENOISE), albedo=array, normal=array,
+         samples=optional(whole(1, _covary.most_samples)), denoise=DENOISE, albedo=array, normal=array,
          denoising_albedo=array, denoising_normal=array, position=array, layers=_LAYERS, oidn=OIDN,
          std_error=optional(flag), force=flag, progress=optional(function))
 def combine(crn: Any, independent: Any, estimator: PairEstimator = "mixture", *, light: Film | None = None,

@@ -8,14 +8,14 @@ import textwrap
 import warnings
 from collections.abc import Mapping
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any, Literal, Union, get_args
+from typing import TYPE_CHECKING, Any, Union
 
 from . import _covary
 from ._arguments import (
-    check_names, checked, choice, either, empty_or, flag, function, instance, mapping_of, optional, path, real, scalar,
-    several, text, whole,
+    check_names, checked, either, empty_or, flag, function, instance, mapping_of, optional, path, real, scalar, several,
+    text, whole,
 )
-from ._combine import DENOISE, DenoiseMode
+from ._combine import DENOISE
 from ._options import DEFAULT, declared_rules, option_texts, passes_of, text_options, underscored
 from ._page import LivePage
 from ._result import BadSample, RenderResult, text_of_bad_samples
@@ -26,11 +26,10 @@ from .scenes import _file_of
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from ._keywords import RenderOptions
+    from ._keywords import DenoiseMode, Filter, RenderOptions
     from .estimators import Estimator
 
 PathOrScene = Union[str, "PathLike[str]", "Scene"]
-Filter = Literal["box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos"]
 
 _SCALARS = optional(mapping_of(scalar, "a mapping from names to True, False, numbers or texts"))
 _CHECKPOINT_SECONDS = 300.0  # as the program
@@ -162,8 +161,10 @@ def _check_scene_arguments(scene: PathOrScene, options: Mapping[str, Any]) -> No
         raise UsageError(f"{', '.join(found)}: not of render(), but of Scene.load(): render(Scene.load({load}), …)")
 
 
+_OPTIONS = declared_rules(_covary.render_options())
+FILTER = _OPTIONS["rfilter"]
 #: Options that are keywords as declared, without those that are arguments by another name or belong to Scene.load().
-_DECLARED = {name: rule for name, rule in declared_rules(_covary.render_options()).items()
+_DECLARED = {name: rule for name, rule in _OPTIONS.items()
              if name not in ("rfilter", "no_preview", "resolution", "environment", "background", "camera")}
 
 
@@ -171,11 +172,11 @@ _DECLARED = {name: rule for name, rule in declared_rules(_covary.render_options(
          scene=SCENE, spp=optional(SPP), estimator=optional(text), integrator=text, until=optional(real(0, above=True)),
          until_p95=optional(real(0, above=True)), until_relative=optional(real(0, above=True)),
          time=optional(real(0, above=True)), seed=SEED,
-         denoise=optional(DENOISE), oidn=empty_or(path), output=optional(path), passes=optional(path), resume=flag,
+         denoise=DENOISE, oidn=empty_or(path), output=optional(path), passes=optional(path), resume=flag,
          overwrite=flag, checkpoint=optional(real(0)), preview=flag,
          crop=optional(several("(x, y, width, height) in pixels", whole(0, 65535), whole(0, 65535), whole(1, 65536),
                                whole(1, 65536))),
-         filter=optional(choice(get_args(Filter))),
+         filter=FILTER,
          split=optional(several("(CRN, independent), two numbers above 0", real(0, above=True), real(0, above=True))),
          films_only=flag, live=either("True, False or a port from 1 to 65535", flag, whole(1, 65535)),
          threads=whole(0, 4096), progress=PROGRESS)

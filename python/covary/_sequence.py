@@ -8,22 +8,22 @@ import time
 from collections.abc import Iterable
 from os import PathLike, fspath
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 from ._arguments import (
-    Rule, check_names, checked, choice, empty_or, flag, function, instance, optional, path, real, several, text, whole,
+    Rule, check_names, checked, empty_or, flag, function, instance, optional, path, real, several, text, whole,
 )
-from ._combine import DENOISE, DenoiseMode, Progress
+from ._combine import DENOISE, Progress
 from ._options import DEFAULT, option_texts, text_options
 from ._program import run_program
-from ._render import _DECLARED, SEED, SPP, Filter, render
+from ._render import _DECLARED, FILTER, SEED, SPP, render
 from .errors import Error, UsageError
 from .scenes import _file_of
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from ._keywords import RenderOptions
+    from ._keywords import DenoiseMode, Filter, RenderOptions
     from .estimators import Estimator
 
 _LOOK_SECONDS = 0.2
@@ -71,8 +71,8 @@ def _watch(files: list[Path], since: float, keeps: bool, progress: Progress,
 @checked(_OPTIONS, scene=path, output=path, frames=_RULE, spp=optional(SPP), estimator=optional(text),
          integrator=text, camera_path=optional(path), fps=optional(real(0.01)), history=flag,
          resolution=optional(several("(width, height), each from 1 to 65536", whole(1, 65536), whole(1, 65536))),
-         until=optional(real(0, above=True)), time=optional(real(0, above=True)), seed=SEED, denoise=optional(DENOISE),
-         oidn=empty_or(path), filter=optional(choice(get_args(Filter))), resume=flag, overwrite=flag, preview=flag,
+         until=optional(real(0, above=True)), time=optional(real(0, above=True)), seed=SEED, denoise=DENOISE,
+         oidn=empty_or(path), filter=FILTER, resume=flag, overwrite=flag, preview=flag,
          threads=whole(0, 4096), progress=optional(function))
 def render_frames(scene: str | PathLike[str], output: str | PathLike[str], frames: str | range,
                   spp: int | None = None, estimator: Estimator | None = None, *, integrator: str = "",
