@@ -100,9 +100,12 @@ def sandbox_environment(base, covary, python, folder):
     (programs / "covary").write_text(f'#!/bin/sh\nexec {covary} "$@"\n')
     for name in ("python", "python3"):
         (programs / name).write_text(f'#!/bin/sh\nexec {python} "$@"\n')
+    # Readers have a browser, here one that only looks whether the page is there.
+    (programs / "xdg-open").write_text('#!/bin/sh\ncase "$1" in http:*) ;; *) test -s "${1#file://}";; esac\n')
     for file in programs.iterdir():
         file.chmod(0o755)
-    return {**base, "PATH": f"{programs}:{base['PATH']}", "HOME": str(folder), "COVARY_PROGRAM": str(covary)}
+    return {**base, "PATH": f"{programs}:{base['PATH']}", "HOME": str(folder), "COVARY_PROGRAM": str(covary),
+            "DISPLAY": ":0"}
 
 
 __all__ = ["Files", "inputs_of", "sandbox_environment", "Path"]
