@@ -154,7 +154,7 @@ class HeaderCheck {
     file_.reset(std::fopen(path.c_str(), "rb"));
     if (!file_)
       throw Error(ErrorCode::kIo, fmt::format("cannot read {}: {}", path.empty() ? "''" : path, std::strerror(errno)));
-    left_ = std::filesystem::file_size(path, ignored);
+    left_ = size_ = std::filesystem::file_size(path, ignored);
   }
 
   /// The first bytes of the file, or fewer if it is shorter.
@@ -172,8 +172,31 @@ class HeaderCheck {
       check_part();
       return;
     }
+    is_multipart_ = true;
     while (check_part()) {  // an empty header follows the last part
     }
+  }
+
+  /// After check(): whether the chunk that is stored last is whole. The tables of offsets, which fill the file up to the
+  /// first chunk, must be complete. Throws Error(kInput) if the file ends before.
+  bool has_last_chunk(const Imf::MultiPartInputFile& file) {
+    const uint64_t table = size_ - left_;
+    uint64_t first = size_, last = 0;
+    for (uint64_t at = table; at < first; at += sizeof(uint64_t)) {
+      const uint64_t offset = long_number();
+      first = std::min(first, offset), last = std::max(last, offset);
+    }
+    if (last < table || last >= size_ || std::fseek(file_.get(), static_cast<long>(last), SEEK_SET) != 0) return false;
+    left_ = size_ - last;
+    const uint32_t part = is_multipart_ ? whole_number() : 0;
+    if (part >= static_cast<uint32_t>(file.parts())) return false;
+    const Imf::Header& header = file.header(static_cast<int>(part));
+    const bool is_deep = header.hasType() && Imf::isDeepData(header.type());
+    for (int n = header.hasTileDescription() ? 4 : 1; n > 0; --n) whole_number();  // place in the image
+    if (!is_deep) return whole_number() <= left_;
+    const uint64_t counts = long_number(), samples = long_number();
+    long_number();  // size when unpacked
+    return counts <= left_ && samples <= left_ - counts;
   }
 
  private:
@@ -257,9 +280,15 @@ class HeaderCheck {
     return number;
   }
 
+  uint64_t long_number() {
+    const uint64_t low = whole_number();
+    return low | static_cast<uint64_t>(whole_number()) << 32;
+  }
+
   std::string path_;
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
-  uint64_t left_ = 0;  // bytes left to read
+  uint64_t size_ = 0, left_ = 0;  // bytes of the file, and those left to read
+  bool is_multipart_ = false;
 };
 
 }  // namespace
@@ -272,11 +301,12 @@ bool is_exr(const std::string& path) {
 void check_exr_header(const std::string& path) { HeaderCheck(path).check(); }
 
 bool is_complete_exr(const std::string& path) try {
-  check_exr_header(path);
+  HeaderCheck header(path);
+  header.check();
   const Imf::MultiPartInputFile file(path.c_str(), 0);
   for (int part = 0; part < file.parts(); ++part)
     if (!file.partComplete(part)) return false;
-  return true;
+  return header.has_last_chunk(file);
 } catch (const std::exception&) {
   return false;
 }

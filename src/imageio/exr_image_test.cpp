@@ -158,6 +158,18 @@ TEST(ExrImage, ReadsThePartThatIsThePicture) {
   EXPECT_EQ(reader->read_floats(0, 3), std::vector<float>(colours.begin(), colours.end()));
 }
 
+TEST(ExrImage, IsCompleteWithItsLastPixels) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("a.exr");
+  write(path, {"R", "G", "B"});
+  EXPECT_TRUE(is_complete_exr(path));
+  for (auto size = std::filesystem::file_size(path); size > 0; --size) {
+    std::filesystem::resize_file(path, size - 1);
+    EXPECT_FALSE(is_complete_exr(path)) << size - 1;
+  }
+  EXPECT_FALSE(is_complete_exr(folder.file("none.exr")));
+}
+
 TEST(ExrImage, TellsOfMissingPixels) {
   const TemporaryFolder folder;
   const std::string path = folder.file("a.exr");
