@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "combine/registry.h"
+#include "denoising/denoise.h"
 #include "denoising/mixed_denoising.h"
 #include "estimators/test_images.h"
 
@@ -85,10 +86,10 @@ void check(const Estimator& estimator, const Scene& scene, bool with_guides, int
   EXPECT_LE(most, at_once) << what;
 }
 
-Estimator denoiser(const char* name, DenoiseMode mode) {
+Estimator denoiser(const char* name, DenoiseMode mode, bool with_network = false) {
   MixedDenoisingOptions options;
   options.mode = mode;
-  options.use_oidn = false;
+  options.use_oidn = with_network;
   return with_denoising(make_estimator(name), options);
 }
 
@@ -121,6 +122,19 @@ TEST(RowsDenoising, OfAPairHaveTheBitsOfTheWhole) {
   for (const DenoiseMode mode : {DenoiseMode::kAuto, DenoiseMode::kBalanced})
     check(denoiser("iicv", mode), scene, true, 60, denoise_mode_names()[static_cast<size_t>(mode)]);
   check(denoiser("iicv", DenoiseMode::kAuto), Scene(601, 4), true, 60, "of too few groups");
+}
+
+/// The network sees the whole picture, so that its images have no seams, and bands of the mixture take their rows.
+TEST(RowsDenoising, WithTheNetworkHaveTheBitsOfTheWhole) {
+  if (find_denoiser().empty()) {  // cli.Denoise does the same with a stand-in that sees the whole picture, too
+    EXPECT_NE(missing_network({"auto"}).find("pip install pyoidn"), std::string::npos);
+    return;
+  }
+  const Scene scene(331, 4);
+  const Estimator of_mean = denoiser("none", DenoiseMode::kAuto, true);
+  check(of_mean, scene, true, 24, "a mean with guides");
+  check(of_mean, scene, false, 60, "a mean without guides");
+  check(denoiser("iicv", DenoiseMode::kAuto, true), Scene(601, 6), true, 60, "a pair");
 }
 
 }  // namespace

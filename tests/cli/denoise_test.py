@@ -291,6 +291,20 @@ class Denoise(RenderTest):
         self.bad(1, "'part.exr' has the pixels 48 x 32 at (4, 0); 'mitsuba0.exr' needs 48 x 32 at (0, 0)", *two,
                  "--albedo", "part.exr")
 
+    def test_bands_with_a_network(self):
+        """The network sees the whole picture: the stand-in's pixels come from the other end of it."""
+        size, chance = (16, 700), random.Random(3)
+        n = size[0] * size[1]
+        for name in "ab":
+            planes = {c: [chance.expovariate(1) for _ in range(n)] for c in "RGB"}
+            planes |= {f"albedo.{c}": [0.3 + 0.4 * (i // 640 % 2) for i in range(n)] for c in "RGB"}
+            self.write(f"{name}.exr", exr(planes, size))
+        command = ("denoise", "a.exr", "b.exr", "--oidn", os.environ["STAND_IN_DENOISER"], "-o")
+        self.good(*command, "whole.exr")
+        self.good(*command, "bands.exr", "--memory", "4")
+        whole, bands = (read_exr((self.path / f"{name}.exr").read_bytes()) for name in ("whole", "bands"))
+        self.assertEqual(bands, whole)
+
     def test_layers_add_up(self):
         """Of two renders, with and without a network, by covary denoise and combine."""
         for seed in ("1", "2"):
