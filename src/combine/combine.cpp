@@ -191,13 +191,16 @@ void check_denoised(const ImageOrigin& origin, int groups, std::vector<Finding>&
   findings.push_back(
       {Finding::Severity::kError,
        fmt::format("{} is denoised already ({}): what is left of the noise does not tell its error; give "
-                   "the renders before denoising",
-                   origin.name, origin.denoised)});
+                   "the renders before denoising ({})",
+                   origin.name, origin.denoised, where_to_set(RenderSetting::kNoDenoiser, origin.renderer))});
 }
 
-/// What messages call the images: with a CRN image, by their roles.
+/// What messages call the images: with a CRN image, by their roles and files.
 ImageNames names_of(const ImageOrigin& origin, const char* role) {
-  return {*role ? role : (origin.renders.size() > 1 ? "the renders" : origin.name), origin.renders};
+  const bool has_files = origin.renders.size() > 1;
+  const std::string name = *role ? role + (has_files ? fmt::format(" ({})", origin.name) : std::string())
+                                 : (has_files ? "the renders" : origin.name);
+  return {name, origin.renders, origin.renderer};
 }
 
 void report(const std::vector<StrayValue>& strays, const ImageNames& names, std::vector<Finding>& findings) {
@@ -253,7 +256,7 @@ InputFindings examine(const CombineRequest& request) {
     crn_seeds.add_rows(g), seeds.add_rows(h);
     of_crn.add_rows(g), of_independent.add_rows(h);
   }
-  const ImageNames crn_names = names_of(crn_origin, "CRN"),
+  const ImageNames crn_names = names_of(crn_origin, "CRN image"),
                    names = names_of(independent.origin, request.crn ? "independent image" : "");
   inputs.report = checkable ? checks.report(crn_names, names) : unchecked_report();
   crn_seeds.report(crn_names, inputs.report.findings), seeds.report(names, inputs.report.findings);

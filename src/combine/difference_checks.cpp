@@ -79,15 +79,16 @@ void DifferenceChecks::report(const ImageNames& names, std::vector<Finding>& fin
            fmt::format("differences of {} and {} are correlated {} pixels apart (signs by {:.2f}; noise by 0): "
                        "they were denoised before, their pixels share random numbers, or they show different scenes, "
                        "lights or exposures (one is brighter in {:.0f} % of the pixels); render both without a "
-                       "denoiser, differing only in the seed",
-                       names.render(t), names.render(t + 1), kDistance, correlation, 100 * brighter)});
+                       "denoiser ({}), differing only in the seed ({})",
+                       names.render(t), names.render(t + 1), kDistance, correlation, 100 * brighter,
+                       names.how_to(RenderSetting::kNoDenoiser), names.how_to(RenderSetting::kSeed))});
     else if (is_brighter)
       findings.push_back(
           {Finding::Severity::kError,
            fmt::format("one of {} and {} is brighter in {:.0f} % of the pixels that differ; if only their "
                        "seeds differed, it would be one half: exposure, lights or numbers of samples differ, or their "
-                       "pixels share random numbers",
-                       names.render(t), names.render(t + 1), 100 * brighter)});
+                       "pixels share random numbers; change only the seed ({})",
+                       names.render(t), names.render(t + 1), 100 * brighter, names.how_to(RenderSetting::kSeed))});
     else
       continue;
     return;  // one such pair is enough

@@ -131,6 +131,8 @@ GroupedFile::GroupedFile(const std::vector<std::string>& paths, const std::strin
 
 ColourSpace GroupedFile::colours() const { return layer_colours(files_[0]->colours(), groups_[0].channels); }
 
+Renderer GroupedFile::renderer() const { return written_by(files_[0]->attributes()); }
+
 std::string GroupedFile::groups_text() const {
   return fmt::format("{} {}", groups(), files_.size() > 1 ? "renders" : "groups");
 }
@@ -183,8 +185,9 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
 void GroupedFile::take_film_facts(const std::string& path, const ExrFile& file, bool may_be_film) {
   const double samples = samples_per_pixel(file, path);
   if (files_.size() > 1 && samples != samples_of_group_)
-    fail(path, fmt::format("has {} samples per pixel, {} {}; render all with the same number", samples,
-                           source_.files[files_.size() - 2], samples_of_group_));
+    fail(path, fmt::format("has {} samples per pixel, {} {}; render all with the same number ({})", samples,
+                           source_.files[files_.size() - 2], samples_of_group_,
+                           where_to_set(RenderSetting::kSamples, renderer())));
   samples_of_group_ = samples;
   samples_ += samples;
   const ExrFile::Channel* counts = file.find(kCounts);

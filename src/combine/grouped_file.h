@@ -13,6 +13,7 @@
 #include "combine/result_source.h"
 #include "film/exr.h"
 #include "film/grouped_image.h"
+#include "film/written_by.h"
 
 namespace covary {
 
@@ -32,6 +33,7 @@ class GroupedFile {
   ColourSpace colours() const;
   int groups() const { return static_cast<int>(groups_.size()); }
   std::string groups_text() const;  ///< "2 renders", or "12 groups" of one file
+  Renderer renderer() const;        ///< that made the first file
   /// Samples per pixel of all groups together, averaged over pixels; 0 if the files do not say.
   double samples() const { return samples_; }
   /// Whether the number of samples of each pixel is known, so that read_rows() gives counts.

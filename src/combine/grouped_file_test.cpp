@@ -143,7 +143,7 @@ TEST_F(GroupedFileTest, SaysWhatIsWrong) {
             "wide.exr: 9 x 5 pixels at (0, 0) of a frame of 9 x 5; plain.exr has 7 x 5 at (0, 0) of 7 x 5");
   EXPECT_EQ(
       message({write("a.exr", {""}, 0, {{"covary:samples", "8"}}), write("b.exr", {""}, 0, {{"covary:samples", "6"}})}),
-      "b.exr: has 6 samples per pixel, a.exr 8; render all with the same number");
+      "b.exr: has 6 samples per pixel, a.exr 8; render all with the same number (in covary --spp)");
   for (const char* samples : {"many", "12 or so", "-4", "nan", "1e30"})
     EXPECT_EQ(
         message({write("odd.exr", {""}, 0, {{"covary:samples", samples}})}),

@@ -12,6 +12,7 @@ GroupedSource source_of(const GroupedFile& file) {
   source.origin = {file.name(),        file.place(),    file.sampling(),      file.scene_hash(),
                    file.settings(),    file.has_half(), file.is_light_film(), file.has_light_added(),
                    file.is_one_film(), file.denoised(), file.colours()};
+  source.origin.renderer = file.renderer();
   if (file.source().files.size() == static_cast<size_t>(file.groups())) source.origin.renders = file.source().files;
   source.width = file.width(), source.height = file.height(), source.groups = file.groups();
   source.samples = file.samples();

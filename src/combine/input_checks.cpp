@@ -166,8 +166,8 @@ void check_values(const ImageNames& names, long pixels, const Values& v, std::ve
     findings.push_back(
         {Severity::kError,
          fmt::format("{}: {} of {} pixels are exactly 1 in all renders and channels, and none is brighter: values are "
-                     "clipped; save linear, unclipped 32-bit float values (not PNG, no tone mapping)",
-                     name, v.clipped, pixels)});
+                     "clipped; save linear, unclipped 32-bit float values, not PNG and without tone mapping ({})",
+                     name, v.clipped, pixels, names.how_to(RenderSetting::kFloats))});
 }
 
 std::string signed_value(const Correlation& c) { return fmt::format("{:+.3f} (± {:.3f})", c.value, c.standard_error); }
@@ -176,7 +176,8 @@ bool significant(const Correlation& c, double limit) {
   return c.pairs > 0 && std::abs(c.value) > std::max(limit, 5 * c.standard_error);
 }
 
-void check_correlations(const InputReport& r, std::vector<Finding>& findings) {
+void check_correlations(const ImageNames& of_crn, const ImageNames& names, const InputReport& r,
+                        std::vector<Finding>& findings) {
   const Correlation& independent = std::abs(r.independent_horizontal.value) > std::abs(r.independent_vertical.value)
                                        ? r.independent_horizontal
                                        : r.independent_vertical;
@@ -185,56 +186,56 @@ void check_correlations(const InputReport& r, std::vector<Finding>& findings) {
       findings.push_back(
           {Severity::kError,
            fmt::format(
-               "independent image: errors of neighbouring pixels have a rank correlation of {}; independent pixels "
+               "{}: errors of neighbouring pixels have a rank correlation of {}; independent pixels "
                "have 0. This looks like an image with common random numbers: are CRN and independent image swapped?",
-               signed_value(independent))});
+               names.image, signed_value(independent))});
     else if (independent.value > 0)
       findings.push_back(
           {Severity::kError,
            fmt::format(
-               "independent image: errors of neighbouring pixels have a rank correlation of {}; independent pixels "
+               "{}: errors of neighbouring pixels have a rank correlation of {}; independent pixels "
                "have 0. The pixel "
                "filter is wider than a pixel. Render both images with a box filter: in Mitsuba <rfilter "
                "type=\"box\"/>, in pbrt PixelFilter \"box\" \"float xradius\" 0.5 \"float yradius\" 0.5, in Blender "
                "scene.cycles.pixel_filter_type = 'BOX'; and without a denoiser",
-               signed_value(independent))});
+               names.image, signed_value(independent))});
     else
       findings.push_back(
           {Severity::kError,
            fmt::format(
-               "independent image: errors of neighbouring pixels have a rank correlation of {}; independent pixels "
+               "{}: errors of neighbouring pixels have a rank correlation of {}; independent pixels "
                "have 0. The "
                "sampler "
                "spreads errors as blue noise. Use independent random numbers: in Mitsuba <sampler "
                "type=\"independent\"/>, in pbrt Sampler \"independent\", in Blender scene.cycles.sampling_pattern = "
                "'TABULATED_SOBOL' ('PROGRESSIVE_MULTI_JITTER' before 3.5) with scrambling_distance = 1",
-               signed_value(independent))});
+               names.image, signed_value(independent))});
   }
   if (significant(r.crn_independent, kMaxIndependentCorrelation))
     findings.push_back(
         {Severity::kError,
-         fmt::format(
-             "CRN and independent image: errors of the same pixel in both images have a rank correlation of {}; "
-             "independent images have 0. Render them with different seeds",
-             signed_value(r.crn_independent))});
+         fmt::format("{} and {}: errors of the same pixel in both images have a rank correlation of {}; "
+                     "independent images have 0. Render them with different seeds ({})",
+                     of_crn.image, names.image, signed_value(r.crn_independent), names.how_to(RenderSetting::kSeed))});
   const double crn = std::max(r.crn_horizontal.value, r.crn_vertical.value);
   if (r.crn_horizontal.pairs + r.crn_vertical.pairs > 0 &&
       crn < std::max(kMinCrnCorrelation, 5 * r.crn_horizontal.standard_error)) {
     findings.push_back(
         {Severity::kError,
          fmt::format(
-             "CRN: errors of neighbouring pixels have a rank correlation of only {}; common random numbers give 0.3 to "
+             "{}: errors of neighbouring pixels have a rank correlation of only {}; common random numbers give 0.3 to "
              "0.9. The pixels do not share their random numbers. Seed the generator by the sample alone, not by the "
              "pixel: in Mitsuba and pbrt this needs a sampler of your own (independent numbers whose seed leaves the "
              "pixel out), in Blender scene.cycles.sampling_pattern = 'TABULATED_SOBOL' ('PROGRESSIVE_MULTI_JITTER' "
              "before 3.5), "
              "auto_scrambling_distance = False and scrambling_distance = 0, with another seed for every group",
-             signed_value(r.crn_horizontal))});
+             of_crn.image, signed_value(r.crn_horizontal))});
   }
 }
 
 /// Whether both images have the same mean, within their noise.
-void check_means(const Values& crn, const Values& independent, InputReport& r) {
+void check_means(const ImageNames& of_crn, const ImageNames& names, const Values& crn, const Values& independent,
+                 InputReport& r) {
   const double deviation = std::sqrt(crn.variance_of_mean + independent.variance_of_mean),
                difference = crn.mean - independent.mean;
   if (deviation > 0) r.mean_difference_sigmas = difference / deviation;
@@ -242,9 +243,9 @@ void check_means(const Values& crn, const Values& independent, InputReport& r) {
   if (std::abs(difference) > std::max(kMaxSigmas * deviation, 1e-4 * scale))
     r.findings.push_back(
         {Severity::kError,
-         fmt::format("the image means {:.5g} (CRN) and {:.5g} (independent) differ by {:.1f} standard errors: the "
-                     "images do not show the same scene with the same settings",
-                     crn.mean, independent.mean, std::abs(r.mean_difference_sigmas))});
+         fmt::format("{} has the mean {:.5g}, {} {:.5g}: they differ by {:.1f} standard errors, and do not show the "
+                     "same scene with the same settings",
+                     of_crn.image, crn.mean, names.image, independent.mean, std::abs(r.mean_difference_sigmas))});
 }
 
 }  // namespace
@@ -296,6 +297,10 @@ std::string ImageNames::render(size_t group) const {
   return group < renders.size() ? renders[group] : fmt::format("render {}", group + 1);
 }
 
+std::string ImageNames::count(size_t n) const {
+  return fmt::format("{} {}{}", n, renders.empty() ? "group" : "render", n == 1 ? "" : "s");
+}
+
 InputReport InputChecks::report(const ImageNames& of_crn, const ImageNames& of_independent) const {
   const State& s = *state_;
   COVARY_CHECK(s.next_row == s.height, "all rows were given");
@@ -324,22 +329,20 @@ InputReport InputChecks::report(const ImageNames& of_crn, const ImageNames& of_i
   r.independent_horizontal = s.independent_horizontal.result();
   r.independent_vertical = s.independent_vertical.result();
   r.crn_independent = s.crn_independent.result();
-  check_correlations(r, r.findings);
+  check_correlations(of_crn, of_independent, r, r.findings);
   const size_t crn_groups = crn.group_means.size(), independent_groups = independent.group_means.size();
   if (independent_groups < 3)
     r.findings.push_back(
         {Severity::kWarning,
-         fmt::format(
-             "independent image: with {} group{} it cannot be checked whether its pixels are independent; 12 groups "
-             "are recommended",
-             independent_groups, independent_groups == 1 ? "" : "s")});
+         fmt::format("{}: with {} it cannot be checked whether its pixels are independent; 12 are recommended",
+                     of_independent.image, of_independent.count(independent_groups))});
   else if (r.independent_horizontal.pairs < kFewPairs)
     r.findings.push_back(
-        {Severity::kNote,
-         fmt::format("independent image: only {} pairs of pixels with noise; correlations are hardly tested",
-                     r.independent_horizontal.pairs)});
+        {Severity::kNote, fmt::format("{}: only {} pairs of pixels with noise; correlations are hardly tested",
+                                      of_independent.image, r.independent_horizontal.pairs)});
 
-  if (crn_groups >= 3 && independent_groups >= 3 && r.nonfinite_pixels == 0) check_means(crn, independent, r);
+  if (crn_groups >= 3 && independent_groups >= 3 && r.nonfinite_pixels == 0)
+    check_means(of_crn, of_independent, crn, independent, r);
   return r;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "film/grouped_image.h"
+#include "film/written_by.h"
 
 namespace covary {
 
@@ -29,8 +30,12 @@ struct Correlation {
 /// What messages call an image and the renders that it consists of.
 struct ImageNames {
   std::string image = "independent image";
-  std::vector<std::string> renders;  ///< files, one for each group; empty: groups of one file
+  std::vector<std::string> renders;        ///< files, one for each group; empty: groups of one file
+  Renderer renderer = Renderer::kUnknown;  ///< that made them
   std::string render(size_t group) const;
+  /// "3 renders", "12 groups"
+  std::string count(size_t n) const;
+  std::string how_to(RenderSetting setting) const { return where_to_set(setting, renderer); }
 };
 
 struct InputReport {
@@ -57,7 +62,7 @@ class InputChecks {
   /// The next rows of both images. Throws Error(kUsage) if sizes differ or there are no rows.
   void add_rows(const GroupedImage& crn, const GroupedImage& independent);
   /// Call after the last row.
-  InputReport report(const ImageNames& crn = {"CRN", {}}, const ImageNames& independent = {}) const;
+  InputReport report(const ImageNames& crn = {"CRN image", {}}, const ImageNames& independent = {}) const;
 
  private:
   struct State;

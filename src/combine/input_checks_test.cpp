@@ -76,7 +76,8 @@ TEST(InputChecks, FindsSwappedAndNotCommonImages) {
   const std::string swapped = findings(good_independent(), good_crn());
   EXPECT_NE(swapped.find("are CRN and independent image swapped?"), std::string::npos) << swapped;
   const std::string independent = findings(test::independent_image(kWidth, kHeight, kGroups, 9), good_independent());
-  EXPECT_NE(independent.find("!CRN: errors of neighbouring pixels have a rank correlation of only"), std::string::npos);
+  EXPECT_NE(independent.find("!CRN image: errors of neighbouring pixels have a rank correlation of only"),
+            std::string::npos);
   EXPECT_NE(independent.find("scrambling_distance = 0"), std::string::npos);
   EXPECT_NE(independent.find("'PROGRESSIVE_MULTI_JITTER' before 3.5"), std::string::npos);
 }
@@ -86,10 +87,10 @@ TEST(InputChecks, FindsImagesThatShareRandomNumbers) {
   test::Grouped independent = good_independent();
   for (size_t i = 0; i < independent.data.size(); ++i)
     independent.data[i] = 0.8f * independent.data[i] + 0.2f * crn.data[i];
-  EXPECT_NE(
-      findings(crn, independent)
-          .find("!CRN and independent image: errors of the same pixel in both images have a rank correlation of +0."),
-      std::string::npos);
+  EXPECT_NE(findings(crn, independent)
+                .find("!CRN image and independent image: errors of the same pixel in both images have a rank "
+                      "correlation of +0."),
+            std::string::npos);
 }
 
 TEST(InputChecks, FindsBadValues) {
@@ -155,7 +156,7 @@ TEST(InputChecks, BandsGiveTheSameFindings) {
 TEST(InputChecks, SaysWhatItCannotCheck) {
   const test::Grouped crn = good_crn(), one = test::independent_image(kWidth, kHeight, 1, 2);
   EXPECT_EQ(findings(crn, one),
-            "?independent image: with 1 group it cannot be checked whether its pixels are independent; 12 groups are "
+            "?independent image: with 1 group it cannot be checked whether its pixels are independent; 12 are "
             "recommended\n");
   const test::Grouped flat = test::constant_image(8, 8, 12, 0.5f);
   EXPECT_EQ(findings(flat, flat),

@@ -47,10 +47,8 @@ void check_origins(const ImageOrigin& crn, const ImageOrigin& independent, std::
     if (origin->has_half)
       findings.push_back(
           {Severity::kWarning,
-           fmt::format(
-               "{}: values have 16 bits, which limits what can be gained; save 32-bit float values: in Mitsuba "
-               "component_format \"float32\", in pbrt Film \"bool savefp16\" false, in Blender color_depth = '32'",
-               name)});
+           fmt::format("{}: values have 16 bits, which limits what can be gained; save 32-bit float values ({})", name,
+                       where_to_set(RenderSetting::kFloats, origin->renderer))});
 }
 
 void check_light(const ImageOrigin& crn, const ImageOrigin& independent, const ImageOrigin* light,

@@ -11,6 +11,7 @@
 #include "combine/input_checks.h"
 #include "estimators/estimator.h"
 #include "film/exr.h"
+#include "film/written_by.h"
 #include "settings/settings.h"
 
 namespace covary {
@@ -27,7 +28,8 @@ struct ImageOrigin {
   bool is_one_film = false;          ///< all groups are of one film of covary, and so of different samples
   std::string denoised;              ///< denoised_by() of film/denoised_by.h
   ColourSpace colours = {};
-  std::vector<std::string> renders = {};  ///< files, if each holds one group
+  std::vector<std::string> renders = {};   ///< files, if each holds one group
+  Renderer renderer = Renderer::kUnknown;  ///< that made them
 };
 
 /// Appends to `findings` what in the origins argues against combining the images. Throws Error(kInput) if they do not

@@ -90,10 +90,11 @@ void SameSeedChecks::report(const ImageNames& names, std::vector<Finding>& findi
     const Likeness likeness = compare(groups_[a].details, groups_[b].details);
     if (!likeness.is_same(std::max(groups_[a].varied, groups_[b].varied))) continue;
     const char* how = likeness.identical ? "are identical" : "have the same noise";
-    findings.push_back({Finding::Severity::kError,
-                        fmt::format("{}: {} and {} {}: the same seed was rendered twice, or there is no noise to "
-                                    "remove; give every render its own seed",
-                                    names.image, names.render(a), names.render(b), how)});
+    findings.push_back(
+        {Finding::Severity::kError,
+         fmt::format("{}: {} and {} {}: the same seed was rendered twice, or there is no noise to "
+                     "remove; give every render its own seed ({})",
+                     names.image, names.render(a), names.render(b), how, names.how_to(RenderSetting::kSeed))});
     return;
   }
 }

@@ -56,7 +56,8 @@ TEST(SameSeed, OneSeedIsFound) {
   EXPECT_EQ(
       findings(repeated(good(12), 9, 0, 0)),
       "image: render 1 and render 10 are identical: the same seed was rendered twice, or there is no noise to remove; "
-      "give every render its own seed");
+      "give every render its own seed (in Blender scene.cycles.seed, in Mitsuba seed of mi.render(), in pbrt --seed, "
+      "in LuxCore renderengine.seed)");
   const test::Grouped rounded = repeated(good(2), 1, 1e-5f, 0.01f);  // 4 % of the squares of 2 x 2 pixels differ
   EXPECT_NE(findings(rounded).find("render 1 and render 2 have the same noise: the same seed"), std::string::npos);
   EXPECT_EQ(findings(rounded), findings(rounded, 16)) << "in bands";
