@@ -32,17 +32,20 @@
 #include "film/image_rows.h"
 #include "film/outputs.h"
 #include "film/pictures.h"
+#include "film/written_by.h"
 #include "filters/stray_values.h"
 #include "frame_files.h"
 #include "guide_layer.h"
 #include "json_output.h"
 #include "metrics/provenance.h"
+#include "network_memory.h"
 #include "numbers.h"
 #include "picture_options.h"
 #include "progress.h"
 #include "risk_report.h"
 #include "sequences/frame_names.h"
 #include "value_names.h"
+#include "watched_folders.h"
 
 namespace covary {
 namespace {
@@ -140,33 +143,17 @@ Image as_alpha(const Image& grey) {
   return alpha;
 }
 
-/// Throws if the network needs too much: per pixel, images (the input, a copy, guides while they are read and the
-/// result) and, in tiles of limited size, its own values.
-void require_memory_of_network(const Options& o, const CropWindow& window) {
-  constexpr double kImageBytes = 7 * 3 * sizeof(float), kBytesOfTile = 600, kLargestTile = 2160.0 * 2160;
-  constexpr double kMebibyte = 1 << 20;
-  const double n_pixels = static_cast<double>(window.width) * window.height;
-  const double bytes = n_pixels * kImageBytes + std::min(n_pixels, kLargestTile) * kBytesOfTile;
-  if (o.memory_mib && bytes > *o.memory_mib * kMebibyte)
-    throw Error(
-        ErrorCode::kUsage,
-        fmt::format("{}: an image of {} x {} pixels needs {} of memory for Open Image Denoise; {} are allowed "
-                    "(--memory)",
-                    o.inputs[0], window.width, window.height, bytes_text(bytes),
-                    bytes_text(*o.memory_mib * kMebibyte)));
-  require_memory(o.inputs[0], fmt::format("an image of {} x {} pixels", window.width, window.height), bytes);
-}
-
 Denoised denoise_by_network(const Options& o, const Task& task, ProgressLine& progress) {
   const Stopwatch watch;
   const std::string& input = o.inputs[0];
   const ImageInfo info = inspect_image(input);
-  require_memory_of_network(o, info.place.window);
+  require_memory_of_network(input, info.place.window, o.memory_mib);
   GuideLayers guides = guides_of(o, task, ImageRows(input, task.layer).colours());
   const PlacedImage image = read_image(input, task.layer, ChecksumPolicy::kCheck, std::nullopt);
   warn_of_values(input, image.image);
   if (const std::string by = denoised_by(info.attributes, info.channels, task.layer); !by.empty())
-    fmt::print(stderr, "warning: {} is denoised already ({}); give the render before denoising\n", input, by);
+    fmt::print(stderr, "warning: {} is denoised already ({}); give the render before denoising ({})\n", input, by,
+               where_to_set(RenderSetting::kNoDenoiser, written_by(info.attributes)));
   progress.begin("denoising");
   Denoiser denoiser(o.denoiser());
   const std::string guided = guides.text();
@@ -338,8 +325,21 @@ void run_sequence(const Options& o, const FramePatterns& patterns) {
   });
 }
 
+void run_folders(const Options& o) {
+  if (!o.json.empty() && o.json != "-")
+    throw Error(ErrorCode::kUsage, fmt::format("--json '{}': for images of a folder, expected -", o.json));
+  FrameOptions of_frames = o.of_frames;
+  of_frames.quiet = o.quiet;
+  for_each_image(of_frames, o.inputs, o.output, [&](const std::vector<std::string>& paths, const std::string& result) {
+    Options one = o;
+    one.inputs = paths, one.output = result, one.quiet = true;
+    return run_one(one);
+  });
+}
+
 void run(const Options& o) {
   if (o.check) return check(o);
+  if (are_folders(o.of_frames, o.inputs, o.output)) return run_folders(o);
   const FramePatterns patterns{o.inputs, {}, o.output, o.choice};
   are_frames(o.of_frames, patterns) ? run_sequence(o, patterns) : static_cast<void>(run_one(o));
 }
@@ -351,9 +351,10 @@ void add_denoise(CLI::App& app) {
   CLI::App* command = app.add_subcommand("denoise", "Denoise an image, or several renders of different seeds");
   add_value(*command, "IN", o->inputs, kFileValue,
             "Linear image (EXR), guided by its albedo and normal layers, whatever the renderer calls them. Several "
-            "renders that differ only in their seed, or a film with groups, give a better image and its error")
+            "renders that differ only in their seed, or a film with groups, give a better image and its error. With "
+            "--watch also folders: files of the same name in each are renders of one picture")
       ->expected(1, 1000);
-  add_value(*command, "-o,--output", o->output, kFileValue, "The result (EXR)");
+  add_value(*command, "-o,--output", o->output, kFileValue, "The result (EXR), or the folder of the results");
   add_picture_options(*command, o->choice, "Denoise", "default: all pictures of the files");
   std::vector<std::string> modes = {kNetwork};
   modes.insert(modes.end(), denoise_mode_names().begin() + 1, denoise_mode_names().end());

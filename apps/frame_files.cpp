@@ -5,17 +5,15 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
 #include <set>
 #include <string_view>
-#include <thread>
 
+#include "batch.h"
 #include "core/error.h"
 #include "core/number_text.h"
-#include "core/printable.h"
 #include "core/stopwatch.h"
 #include "declared_options.h"
 #include "film/image_file.h"
@@ -114,7 +112,7 @@ void add_frame_options(CLI::App& command, FrameOptions& o, const std::string& wh
   command.add_flag("--resume", o.resume, "Of in_####.exr, skip frames whose output exists");
   command.add_flag("--watch", o.watch,
                    "Of in_####.exr, wait for frames and process each when its files are complete, until all of "
-                   "--frames are done, --idle or Ctrl-C");
+                   "--frames are done, --idle or Ctrl-C; denoise: also of folders");
   command.add_option("--idle", o.idle, "With --watch, end after so many seconds without a new frame")
       ->check(positive_number());
   command.add_flag("--no-history", o.no_history, what + " each frame alone");
@@ -141,7 +139,7 @@ bool are_frames(const FrameOptions& o, const FramePatterns& patterns) {
   if (patterns.images.empty() || !is_frame_pattern_of_input(patterns.images[0])) {
     if (!o.frames.empty()) usage("--frames: the input has no '#' for the frame's number");
     if (o.resume) usage("--resume: the input has no '#' for the frame's number");
-    if (o.watch) usage("--watch: the input has no '#' for the frame's number");
+    if (o.watch) usage("--watch: the input is no folder, and has no '#' for the frame's number");
     if (o.idle) usage("--idle is an option of --watch");
     return false;
   }
@@ -248,22 +246,15 @@ class Frames {
       last_ = frame;
       return true;
     }
-    try {
-      const bool has_before = history_.motion && last_ == frame - 1;
-      const std::string said = run_(frame, has_before ? history_of(history_, source_, patterns_, frame) : nullptr);
-      if (!o_.quiet) fmt::print(stderr, "{}: {}\n", which, said);
-      last_ = frame;
-      ++n_done_;
-      return true;
-    } catch (const WrongSequence&) {
-      throw;
-    } catch (const Error& error) {
-      if (error.code() != ErrorCode::kInput) throw;
-      fmt::print(stderr, "warning: {} failed: {}\n", which, printable(error.what()));
-      failed_.push_back(frame);
-      last_.reset();
-      return false;
-    }
+    const bool has_before = history_.motion && last_ == frame - 1;
+    const bool is_done = attempt(which, o_.quiet, [&] {
+      return run_(frame, has_before ? history_of(history_, source_, patterns_, frame) : nullptr);
+    });
+    if (is_done)
+      last_ = frame, ++n_done_;
+    else
+      last_.reset(), failed_.push_back(frame);
+    return is_done;
   }
 
   /// The summary; throws Error(kInput) if frames failed.
@@ -296,8 +287,6 @@ class WatchedFrames {
   }
 
   bool are_all_done() const { return !wanted_.empty() && done_.size() == wanted_.size(); }
-  /// Seconds since a frame was ready.
-  double idle_seconds() const { return idle_.seconds(); }
 
   /// The frames that have become ready: all of their files are there and settled.
   std::vector<int> next() {
@@ -308,11 +297,8 @@ class WatchedFrames {
       for (const std::string& pattern : patterns_.images) n += files_.is_settled(frame_name(pattern, frame));
       if (n == patterns_.images.size()) done_.insert(frame), ready.push_back(frame);
     }
-    if (!ready.empty()) idle_ = Stopwatch();
     return ready;
   }
-  /// Not counting the time that a frame took.
-  void wait() { idle_ = Stopwatch(); }
 
   /// Frames with files that are missing or incomplete.
   std::vector<int> unfinished() const {
@@ -327,7 +313,6 @@ class WatchedFrames {
   std::vector<int> wanted_;
   std::set<int> done_;
   SettledFiles files_;
-  Stopwatch idle_;
 };
 
 /// Waits for frames and runs those that are ready and not done, until all of --frames are, or nothing comes any more.
@@ -337,14 +322,15 @@ void watch_frames(const FrameOptions& o, const FramePatterns& patterns, bool has
   if (!o.quiet)
     fmt::print(stderr, "waiting for frames '{}'; Ctrl-C{} ends\n", patterns.images[0],
                o.idle ? fmt::format(", or {:g} s without a new frame,", *o.idle) : "");
-  while (!watched.are_all_done() && !(o.idle && watched.idle_seconds() > *o.idle)) {
-    for (const int frame : watched.next()) {
+  poll(o.idle, [&] {
+    if (watched.are_all_done()) return Found::kEnd;
+    const std::vector<int> ready = watched.next();
+    for (const int frame : ready) {
       if (!frames) frames.emplace(o, patterns, std::vector{frame, frame + 1}, has_history, run);
       frames->add(frame, fmt::format("frame {}", frame));
-      watched.wait();
     }
-    std::this_thread::sleep_for(std::chrono::milliseconds(500));
-  }
+    return ready.empty() ? Found::kNothing : Found::kWork;
+  });
   const std::vector<int> left = watched.unfinished();
   if (!left.empty())
     fmt::print(stderr, "warning: frames {} are incomplete: files of '{}' are missing or unfinished\n", text_of(left),

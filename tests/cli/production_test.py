@@ -3,10 +3,14 @@
 that a farm writes slowly; headers that are damaged."""
 import os
 import random
+import shlex
+import shutil
 import signal
 import subprocess
 import threading
 import time
+import unittest
+from pathlib import Path
 
 from cli_test import COVARY, CliTest
 from destruction_test import mutilated
@@ -96,6 +100,123 @@ class SlowFarm(CliTest):
         self.bad(2, "--idle is an option of --watch", *DENOISE, "--idle", "3")
 
 
+class WatchedFolder(CliTest):
+    WATCH = ("--oidn", "off", "--watch", "--idle", "5")
+
+    def setUp(self):
+        super().setUp()
+        for folder in "ab":
+            (self.path / folder).mkdir()
+
+    def watch(self, *more):
+        return self.run_covary("denoise", "a", "b", "-o", "out", *self.WATCH, *more)
+
+    def written(self, folder="out"):
+        return sorted(p.name for p in (self.path / folder).iterdir())
+
+    def test_images_are_taken_when_they_are_whole(self):
+        """One program is writing a file, another renames; other files lie around."""
+        images = {(folder, name): noisy(f"{folder}/{name}") for folder in "ab"
+                  for name in ("shot 1.exr", "lamp.EXR", "slow.exr", "late.exr", "half.exr")}
+        for (folder, name), data in images.items():
+            if name not in ("slow.exr", "late.exr") and (folder, name) != ("b", "half.exr"):
+                self.write(f"{folder}/{name}", data)
+        self.write("b/half.exr", images["b", "half.exr"][:900])  # is never finished
+        self.write("a/.hidden.exr", images["a", "shot 1.exr"])
+        self.write("a/notes.txt", b"exr")
+        self.write("b/bad.exr", images["b", "lamp.EXR"])
+        self.write("a/bad.exr", exr({"Z": [1.0] * SIZE[0] * SIZE[1], "N": [1.0] * SIZE[0] * SIZE[1]}, SIZE))
+        self.good("denoise", "a/shot 1.exr", "b/shot 1.exr", "--oidn", "off", "-o", "a/mine.exr")
+        self.write("b/mine.exr", images["b", "lamp.EXR"])
+
+        def farm():
+            time.sleep(1)
+            for folder in "ab":
+                with open(self.path / folder / "slow.exr", "wb") as file:
+                    data = images[folder, "slow.exr"]
+                    for first in range(0, len(data), len(data) // 4):
+                        file.write(data[first:first + len(data) // 4])
+                        file.flush()
+                        time.sleep(0.3)
+                self.write(f"{folder}/late.part", images[folder, "late.exr"])
+                os.rename(self.path / folder / "late.part", self.path / folder / "late.exr")
+
+        thread = threading.Thread(target=farm)
+        thread.start()
+        result = self.watch()
+        thread.join()
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("waiting for images in 'a', 'b'; Ctrl-C, or 5 s without a new one, ends\n", result.stderr)
+        self.assertIn("note: a/mine.exr is left out: 'covary denoise' made it\n", result.stderr)
+        self.assertRegex(result.stderr, r"warning: bad.exr failed: a/bad.exr: .*channels in it: N, Z")
+        self.assertIn("warning: half.exr is incomplete: unfinished, or missing in one of 'a', 'b'\n", result.stderr)
+        self.assertRegex(result.stderr, r"\nshot 1.exr: out/shot 1.exr, predicted relMSE [\d.]+\n")
+        self.assertRegex(result.stderr, r"\n4 images in [\d.]+ s\n")
+        self.assertIn("covary: 1 of 5 images failed: bad.exr", result.stderr)
+        done = ["lamp.EXR", "late.exr", "shot 1.exr", "slow.exr"]
+        self.assertEqual(self.written(), done)
+        for name in done:
+            self.good("denoise", f"a/{name}", f"b/{name}", "--oidn", "off", "-o", "alone.exr", "--overwrite")
+            alone, together = (read_exr((self.path / n).read_bytes()) for n in ("alone.exr", f"out/{name}"))
+            self.assertEqual(together["R"], alone["R"])
+
+    def test_resume(self):
+        for folder in "ab":
+            for name in ("1.exr", "2.exr"):
+                self.write(f"{folder}/{name}", noisy(folder + name))
+        (self.path / "out").mkdir()
+        self.write("out/1.exr", b"there")
+        result = self.watch("--resume", "--quiet")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        self.assertEqual((self.path / "out/1.exr").read_bytes(), b"there")
+        self.assertEqual(self.written(), ["1.exr", "2.exr"])
+
+    def test_wrong_usage(self):
+        self.write("x.exr", noisy("x"))
+        for arguments, message in (
+                (("a", "b", "-o", "out"), "'a' is a folder; --watch denoises the images that are in it"),
+                (("a", "x.exr", "-o", "out", "--watch"), "'x.exr' is not a folder, but other inputs are"),
+                (("a", "b", "-o", "b/../a", "--watch"), "-o 'b/../a': expected another folder than the input"),
+                (("a", "b", "-o", "x.exr", "--watch"), "-o 'x.exr': for images of a folder, expected another folder"),
+                (("a", "-o", "out", "--watch", "--frames", "1-2"), "--frames: the input is a folder"),
+                (("a", "-o", "out", "--watch", "--json", "j"), "--json 'j': for images of a folder, expected -"),
+                (("x.exr", "-o", "y.exr", "--watch"), "--watch: the input is no folder, and has no '#'")):
+            self.bad(2, message, "denoise", *arguments)
+
+
+PAGE = Path(os.environ["SCENES"]).parent / "docs/other-renderers.md"
+
+
+class Recipes(CliTest):
+    @unittest.skipUnless(shutil.which("oiiotool"), "OpenImageIO's oiiotool is not installed")
+    def test_lines_of_the_page(self):
+        section = PAGE.read_text().split("### With oiiotool\n")[1].split("\n##")[0]
+        lines = "\n".join(line.strip() for line in section.splitlines() if line.startswith("    ")) + "\n"
+        self.assertEqual(lines.count("oiiotool "), 5)
+        chance = random.Random(1)
+        n = SIZE[0] * SIZE[1]
+        for render in "ab":
+            self.write(f"{render}.exr", noisy(render))
+            self.write(f"{render}.albedo.exr", exr({c: [0.5] * n for c in "RGB"}, SIZE))
+            self.write(f"{render}.normal.exr", exr({c: [chance.random()] * n for c in "RGB"}, SIZE))
+        lines = lines.replace("covary denoise", f"{shlex.quote(COVARY)} denoise --oidn off")
+        result = subprocess.run(["sh", "-e", "-c", lines], cwd=self.path, capture_output=True, text=True, timeout=60)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("guided by albedo and normal", result.stderr)
+        out, both, picture, grain = (read_exr((self.path / f"{name}.exr").read_bytes())
+                                     for name in ("out", "both", "picture", "grain"))
+        self.assertEqual(sorted(both), sorted([*"RGB", *(f"{layer}.{c}" for layer in ("albedo", "denoised")
+                                                         for c in "RGB"), "N.X", "N.Y", "N.Z"]))
+        for c in "RGB":
+            self.assertEqual(both[f"denoised.{c}"], out[c])
+            self.assertEqual(both[c], read_exr((self.path / "a.exr").read_bytes())[c])
+            self.assertEqual(picture[c], out[c])
+        self.good("info", "picture.exr")
+        expected = [float(e / (g + 0.01) > 0.1) for e, g in zip(out["StdError.G"], out["G"])]
+        self.assertGreater(sum(m == e for m, e in zip(grain["Y"], expected)), 0.98 * n)
+        self.assertGreater(len(set(expected)), 0)
+
+
 class Headers(CliTest):
     FILES = 1000
 
@@ -122,5 +243,4 @@ class Headers(CliTest):
 
 
 if __name__ == "__main__":
-    import unittest
     unittest.main()
