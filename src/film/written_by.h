@@ -9,8 +9,8 @@ namespace covary {
 
 enum class Renderer { kUnknown, kCovary, kBlender, kLuxCore, kMitsuba, kPbrt };
 
-/// By `covary:…` of covary; `cycles.…` and `BlenderMultiChannel` of Blender; `generatedBy` of Mitsuba; `samplesPerPixel`
-/// and `renderTimeSeconds` of pbrt. Files of LuxCore do not tell.
+/// By `covary:…` of covary; `cycles.…` and `BlenderMultiChannel` of Blender; `generatedBy` of Mitsuba;
+/// `samplesPerPixel` and `renderTimeSeconds` of pbrt. Files of LuxCore do not tell.
 Renderer written_by(const std::map<std::string, std::string>& attributes);
 
 enum class RenderSetting {

@@ -177,8 +177,8 @@ class HeaderCheck {
     }
   }
 
-  /// After check(): whether the chunk that is stored last is whole. The tables of offsets, which fill the file up to the
-  /// first chunk, must be complete. Throws Error(kInput) if the file ends before.
+  /// After check(): whether the chunk that is stored last is whole. The tables of offsets, which fill the file up to
+  /// the first chunk, must be complete. Throws Error(kInput) if the file ends before.
   bool has_last_chunk(const Imf::MultiPartInputFile& file) {
     const uint64_t table = size_ - left_;
     uint64_t first = size_, last = 0;

@@ -24,8 +24,8 @@ bool is_exr(const std::string& path);
 /// Throws Error(kInput) if an attribute claims more bytes than the file has, or if the header does not end.
 void check_exr_header(const std::string& path);
 
-/// Whether a program has finished writing or copying the file: the table of its pixels, which is written last, is filled,
-/// and the pixels that are stored last are there. False for files that cannot be read.
+/// Whether a program has finished writing or copying the file: the table of its pixels, which is written last, is
+/// filled, and the pixels that are stored last are there. False for files that cannot be read.
 bool is_complete_exr(const std::string& path);
 
 }  // namespace covary
