@@ -403,9 +403,11 @@ class Files(RenderTest):
         for text in ("-1", "18446744073709551616", "0x10", "1.0", "ten"):
             self.bad(2, f"--seed: '{text}': expected a whole number of at least 0", *render, f"--seed={text}")
         self.bad(2, "of at least 0, at most 18446744073709551615", *render, "--seed=18446744073709551616")
-        for option in ("spp", "groups", "max-depth", "threads", "k"):
-            for text in ("0x20", "99999999999999999999", "1e3"):
+        for text in ("0x20", "99999999999999999999", "1e3"):
+            for option in ("spp", "groups", "max-depth", "threads"):
                 self.bad(2, f"--{option}: '{text}': expected a whole number", *render, f"--{option}={text}")
+            self.bad(2, f"--set k: '{text}': expected a whole number", *render, "--estimator", "iicv", "--set",
+                     f"k={text}")
         for text in ("nan", "inf", "1e400"):
             self.bad(2, f"--time: '{text}': expected a number above 0", *render, f"--time={text}")
             self.bad(2, f"--checkpoint: '{text}': expected a number of at least 0", *render, f"--checkpoint={text}")
