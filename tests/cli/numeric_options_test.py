@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every option that takes a number refuses what is none, whatever else the command line says: the options are read
-from the help of each command, so a new one is tested as well."""
+"""Every option or parameter that takes a number refuses what is none, whatever else the command line says: they are
+read from the help of each command and method, so a new one is tested as well."""
 import re
 import unittest
 
@@ -14,6 +14,8 @@ COMMANDS = {"render": ("scene.xml", "-o", "o.exr"), "probe": ("scene.xml", "-o",
             "combine": ("--crn", "a.exr", "--independent", "b.exr", "-o", "o.exr"),
             "compare": ("a.exr", "--reference", "b.exr", "--error-map", "e.png"),
             "convert": ("a.exr", "o.png"), "view": ("a.exr", "-o", "o.html"), "experiment": ("scene.xml", "-o", "o")}
+METHODS = {"--estimator": ("iicv", "cv-baseline", "iduw", "dependent-tests"),
+           "--integrator": ("controlled-path", "guided-path")}
 SCENE = b"""<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm">
   <integer name="width" value="4"/><integer name="height" value="4"/></film></sensor>
   <shape type="sphere"><emitter type="area"><rgb name="radiance" value="1"/></emitter></shape></scene>"""
@@ -40,7 +42,21 @@ class Numbers(CliTest):
                 for value in NO_NUMBERS:
                     with self.subTest(command=command, option=option, value=value):
                         self.bad(2, option, command, *others, f"{option}={value}")
-        self.assertGreater(n_options, 50)
+        self.assertGreater(n_options, 35)
+
+    def test_parameters_are_numbers(self):
+        """Those of methods and integrators, by --set, as `covary help METHOD` lists them."""
+        n_parameters = 0
+        for kind, methods in METHODS.items():
+            for method in methods:
+                listed = re.findall(r"^ +([\w-]+)=(\S+)", self.good("help", method).stdout, re.MULTILINE)
+                for parameter in [name for name, value in listed if KINDS.search(value)]:
+                    n_parameters += 1
+                    for value in NO_NUMBERS:
+                        with self.subTest(method=method, parameter=parameter, value=value):
+                            self.bad(2, f"--set {parameter}", "render", *COMMANDS["render"], kind, method, "--set",
+                                     f"{parameter}={value}")
+        self.assertGreater(n_parameters, 12)
 
 
 if __name__ == "__main__":
