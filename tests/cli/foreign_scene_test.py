@@ -23,7 +23,7 @@ class ForeignScenes(CliTest):
         return [image[c] for c in "RGB"]
 
     def test_unknown_integrator(self):
-        name = self.scene("s.xml", '<integrator type="photonmapper"><integer name="photons" value="9"/>'
+        name = self.scene("s.xml", '<integrator type="manylights"><integer name="photons" value="9"/>'
                                    '<integer name="max_depth" value="2"/></integrator><emitter type="constant"/>')
         for command in (("render", name, "-o", "x.exr"), ("info", name)):
             self.bad(1, "--integrator path renders the scene by path tracing", *command)
