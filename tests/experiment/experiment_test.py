@@ -352,7 +352,7 @@ class Resume(ExperimentTest):
         self.assertEqual({cell["method"] for cell in results["cells"]}, {"pt", "iicv"})
         self.assertIn("room: the method 'oidn' is left out: ", "".join(results["warnings"]))
         self.assertIn("/nowhere", "".join(results["warnings"]))
-        self.assertIn("At equal samples (24 spp) 'iicv' has the least error", self.stderr)
+        self.assertIn("At equal samples (24 spp) 'iicv' has the lowest error", self.stderr)
         self.suite["methods"][-1] = method
         self.assertEqual(len(self.results("--reference-spp", "64", code=1, **without)["failures"]), 1)
 
