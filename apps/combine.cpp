@@ -18,13 +18,13 @@
 #include "combine/combine.h"
 #include "combine/combine_settings.h"
 #include "combine/pair_input.h"
+#include "combine/registry.h"
 #include "combine/result_file.h"
 #include "commands.h"
 #include "core/error.h"
 #include "core/memory_limit.h"
 #include "core/stopwatch.h"
 #include "declared_options.h"
-#include "estimators/iicv.h"
 #include "estimators/mean.h"
 #include "estimators/sample_counts.h"
 #include "film/film_file.h"
@@ -53,7 +53,7 @@ struct CombineOptions : CombineSettings {
   int threads = 0;
 };
 
-Estimator estimator_of(const CombineOptions& o) {
+Method estimator_of(const CombineOptions& o) {
   if (o.estimator == kDefaultEstimator) return make_default_estimator(!o.crn.empty(), o.of_estimator, o.denoising);
   return with_denoising(make_estimator(o.estimator, o.of_estimator), o.denoising);
 }
@@ -71,14 +71,15 @@ std::vector<std::string> write(const CombineOptions& o, const CombineRequest& re
   return write_result(o.output, request.independent.origin.place, attributes, combined.image, combined.layers, source);
 }
 
-void check_explain(const CombineOptions& o, const Estimator& estimator, const GroupedFile& file) {
+void check_explain(const CombineOptions& o, const Method& estimator, const GroupedFile& file) {
   if (!o.explain) return;
   const CropWindow& window = file.place().window;
   const int x = o.explain->x - window.x, y = o.explain->y - window.y;
   if (estimator.reads_guides)
     throw Error(ErrorCode::kUsage,
-                "--explain: a pixel that is denoised is not a sum of control variates; see --estimator iicv");
-  if (!estimator.explain)
+                "--explain: a pixel that is denoised is not a sum of control variates; see --estimator " +
+                    std::string(kDefaultOfPairs));
+  if (!estimator.pair()->explain)
     throw Error(ErrorCode::kUsage, "--explain: " + o.estimator + " has no control variates with coefficients");
   if (x < 0 || y < 0 || x >= window.width || y >= window.height)
     throw Error(ErrorCode::kUsage,
@@ -97,7 +98,7 @@ nlohmann::ordered_json explain(const CombineOptions& o, const CombineRequest& re
     return mean_of_groups({1, 1, image.groups, image.pixel(px, py), &count}).estimate.data;
   };
   nlohmann::ordered_json variates = nlohmann::ordered_json::array();
-  for (const ControlVariate& v : request.estimator.explain(g, h, x, y - first))
+  for (const ControlVariate& v : request.estimator.pair()->explain(g, h, x, y - first))
     variates.push_back({{"dx", v.dx},
                         {"dy", v.dy},
                         {"beta", v.beta},
@@ -126,7 +127,7 @@ nlohmann::ordered_json json_of(const Correlation& c) {
   return {{"value", c.value}, {"standard_error", c.standard_error}, {"pairs", c.pairs}};
 }
 
-GuideImages guides_of(const CombineOptions& o, const Estimator& estimator, const GroupedFile& file) {
+GuideImages guides_of(const CombineOptions& o, const Method& estimator, const GroupedFile& file) {
   if (o.guides.empty()) return {};
   if (!estimator.reads_guides)
     throw Error(ErrorCode::kUsage,
@@ -188,7 +189,7 @@ struct Inputs {
     if (!o.light.empty()) light.emplace(std::vector{o.light});
     request.estimator = estimator_of(o);
     request.settings = pair_settings(
-        request.estimator, request.estimator.needs_sample_count || o.counts.empty() ? o.samples : std::nullopt,
+        request.estimator, needs_sample_count(request.estimator) || o.counts.empty() ? o.samples : std::nullopt,
         crn ? crn->samples() : 0, o.error || (!o.json.empty() && request.estimator.predicts_error));
     guides = guides_of(o, request.estimator, independent);
     request.settings.guides = guides.view();
@@ -198,7 +199,7 @@ struct Inputs {
     if (crn) request.crn = source_of(*crn);
     request.independent = source_of(independent);
     if (light) request.light = source_of(*light);
-    if (const bool splits = request.estimator.splits_layers; splits || !o.layers.empty())
+    if (const bool splits = request.estimator.splits_layers(); splits || !o.layers.empty())
       request.layers =
           layers.emplace(o.independent, Picture{"", o.view, independent.source().picture}, o.layers, splits).sources();
     limit_memory(request, o.memory_mib);
@@ -247,8 +248,9 @@ nlohmann::ordered_json statistics(const CombineOptions& o, const CombineRequest&
 
 void write_stages(const CombineOptions& o, const CombineRequest& request) {
   if (o.stages.empty()) return;
-  save_stages(o.stages, request.estimator, request.crn ? request.crn->all() : GroupedImage{}, request.independent.all(),
-              request.settings, request.independent.origin.place);
+  save_stages(o.stages, request.estimator,
+              {request.crn ? request.crn->all() : GroupedImage{}, request.independent.all()}, request.settings,
+              request.independent.origin.place);
 }
 
 /// Without a CRN image, the only use is to denoise the independent image's mean. Throws Error(kUsage) otherwise.
@@ -326,8 +328,8 @@ void combine_frames(const CombineOptions& o, const FramePatterns& patterns) {
 
 void run(CombineOptions o) {
   static_cast<CombineSettings&>(o) = settings_from<CombineSettings>(o.values);
-  if (o.estimator == kDefaultEstimator && !o.of_estimator.empty()) {  // who gives an option of iicv means iicv
-    o.estimator = kIicv;
+  if (o.estimator == kDefaultEstimator && !o.of_estimator.empty()) {  // whose options they are
+    o.estimator = kDefaultOfPairs;
     if (!o.values.contains("denoise")) o.denoising.mode = usual_denoising(o.estimator);
   }
   check_passes(o);

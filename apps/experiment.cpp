@@ -10,6 +10,7 @@
 #include <memory>
 #include <sstream>
 
+#include "combine/registry.h"
 #include "commands.h"
 #include "core/content_hash.h"
 #include "core/error.h"
@@ -190,7 +191,7 @@ void add_methods_of_programs(const lab::Programs& programs, bool renders, lab::S
     lab::MethodEntry method;
     method.name = method.program = name;
     method.renders = renders;
-    if (renders) method.options = {"--estimator", "none", "--groups", "8", "--aovs"};
+    if (renders) method.options = {"--estimator", kNoEstimator, "--groups", "8", "--aovs"};
     suite.methods.push_back(method);
   }
 }

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 #include "film/pictures.h"
 
 namespace covary {

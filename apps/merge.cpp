@@ -133,7 +133,7 @@ void add_merge(CLI::App& app) {
   const auto options = std::make_shared<MergeOptions>();
   CLI::App* command = app.add_subcommand("merge", "Merge films of one scene with different seeds into one film");
   add_value(*command, "FILMS", options->inputs, kFileValue,
-            "Films (EXR), written by covary render --passes or --estimator none")
+            fmt::format("Films (EXR), written by covary render --passes or --estimator {}", kNoEstimator))
       ->required()
       ->expected(2, 100000);
   add_value(*command, "-o,--output", options->output, kFileValue, "The merged film (EXR)")->required();

@@ -95,12 +95,13 @@ void write_stages(const RenderOptions& options, const RenderResult& result) {
   const std::span<const Pass> passes = camera_passes(result.passes);
   const Film &first = passes.front().film, &independent = passes.back().film;
   const bool is_pair = passes.size() > 1;
-  PairSettings settings;
+  MethodSettings settings;
   settings.crn_samples = std::llround(first.mean_count());
   if (!result.aovs.empty()) settings.guides = {&result.aovs.at("Albedo"), &result.aovs.at("N")};
-  save_stages(options.stages, estimator_of(options), is_pair ? rows_of(first, 0, first.height()) : GroupedImage{},
-              rows_of(independent, 0, independent.height()), settings,
-              {first.frame_width(), first.frame_height(), first.crop()});
+  save_stages(
+      options.stages, estimator_of(options),
+      {is_pair ? rows_of(first, 0, first.height()) : GroupedImage{}, rows_of(independent, 0, independent.height())},
+      settings, {first.frame_width(), first.frame_height(), first.crop()});
 }
 
 std::string interruption(const RenderOptions& options, const RenderResult& result) {

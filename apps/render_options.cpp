@@ -32,36 +32,9 @@ void check_options(RenderOptions& options) {
   RenderSettings& settings = options.settings;
   if (!options.is_replay() && settings.request.output.empty())
     usage("no output given; use -o OUT.exr (or --replay X,Y,SAMPLE)");
-  const std::string name = settings.estimator;
-  const auto given = [&](const char* option) { return options.values.contains(option); };
-  const Estimator estimator = estimator_of(options);
-  const EstimatorPasses passes = estimator.passes;
-  const bool is_denoised_mean = passes == EstimatorPasses::kIndependent;
-  if (is_denoised_mean && settings.passes.sampling == Sampling::kCrn)
-    usage(
-        "--denoise of a single pass needs --sampling independent: errors that all pixels share show in no difference");
-  if (given("sampling") && passes != EstimatorPasses::kAny && !is_denoised_mean)
-    usage(fmt::format("--sampling is an option of --estimator {}; {} renders one pass {}", kNoEstimator, name,
-                      passes == EstimatorPasses::kSamples
-                          ? "with independent random numbers"
-                          : "with common random numbers and one with independent ones"));
-  check_stages(options.stages, estimator);
-  if (estimator.adaptive && given("split"))
-    usage(fmt::format("--split: the first pass of {} has its own number of samples, --dependent-spp", name));
-  if (estimator.adaptive && given("sampling")) usage("--sampling: --adaptive always takes independent random numbers");
-  if (passes != EstimatorPasses::kPair && given("split"))
-    usage("--split is an option of estimators with two passes, not of " + name);
-  if (passes == EstimatorPasses::kSamples && given("groups"))
-    usage(fmt::format("--groups: {} are fitted to the samples of a pixel themselves, not to means of groups", name));
-  if (passes == EstimatorPasses::kSamples && given("time"))
-    usage(fmt::format(
-        "--time: {} are fitted to all samples of a pixel together, so their number must be known; use --spp", name));
-  if (settings.request.until > 0) {
-    if (!estimator.predicts_error)
-      usage("--until: " + name + " does not estimate its error" + (estimator.adaptive ? "; use relative=X" : ""));
-    if (passes == EstimatorPasses::kAny && settings.passes.groups.value_or(2) < 2)
-      usage("--until needs --groups 2 or more");
-  }
+  const Method method = estimator_of(options);
+  check_given(options.values, settings, method);
+  check_stages(options.stages, method);
 }
 
 namespace {
@@ -92,7 +65,7 @@ LoadedScene load(const RenderOptions& options) {
   return scene;
 }
 
-Estimator estimator_of(const RenderOptions& options) { return estimator_of(options.settings, options.of_estimator); }
+Method estimator_of(const RenderOptions& options) { return estimator_of(options.settings, options.of_estimator); }
 
 Plan make_plan(const RenderOptions& options) { return render_plan(options.settings, options.of_estimator); }
 
@@ -124,7 +97,7 @@ std::vector<SampleAddress> replayed_samples(const RenderOptions& options) {
   address.sample = static_cast<uint64_t>(at[2]);
   if (with_pass) address.pass = static_cast<uint32_t>(at[3]);
   address.groups = options.settings.passes.groups;
-  if (estimator_of(options).passes != EstimatorPasses::kPair) return {address};
+  if (!estimator_of(options).pair()) return {address};
   address.sampling = Sampling::kIndependent;
   std::vector<SampleAddress> both(2, address);
   both[0].sampling = Sampling::kCrn;

@@ -47,7 +47,7 @@ void check_options(RenderOptions& options);
 LoadedScene load(const RenderOptions& options);
 
 /// The request of the options, checked by check_options().
-Estimator estimator_of(const RenderOptions& options);
+Method estimator_of(const RenderOptions& options);
 Plan make_plan(const RenderOptions& options);
 RenderRequest make_request(const RenderOptions& options, const LoadedScene& scene);
 /// The number of the light path of --replay; throws Error(kUsage).

@@ -28,7 +28,7 @@ double work_of_estimate(const RenderOptions& options, double n_pixels) {
 
 std::string estimate_name(const RenderOptions& options) {
   if (options.settings.denoising.denoises()) return "denoising";
-  return estimator_of(options).passes == EstimatorPasses::kPair ? "combining" : "measuring the error";
+  return estimator_of(options).pair() ? "combining" : "measuring the error";
 }
 
 RenderProgress::RenderProgress(const RenderOptions& options, const LoadedScene& scene, const RenderRequest& request,

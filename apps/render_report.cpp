@@ -81,7 +81,7 @@ nlohmann::ordered_json statistics_of(const Pass& pass) {
 }
 
 /// What only applies to some renders.
-void add_results(const RenderReport& report, const Estimator& estimator, nlohmann::ordered_json& json) {
+void add_results(const RenderReport& report, const Method& estimator, nlohmann::ordered_json& json) {
   const RenderResult& result = report.result;
   for (const IntegratorTrial& trial : result.trials) {
     nlohmann::ordered_json found = {{"integrator", trial.integrator}};
@@ -111,7 +111,7 @@ void add_results(const RenderReport& report, const Estimator& estimator, nlohman
 nlohmann::ordered_json statistics(const RenderReport& report) {
   const auto& [options, scene, result, load_seconds, threads] = report;
   const RenderRequest request = make_request(options, scene);
-  const Estimator estimator = estimator_of(options);
+  const Method estimator = estimator_of(options);
   const CropWindow window = window_of(scene, request);
   const double samples = result.camera_sum([](const Pass& p) { return p.result.n_samples; });
   const double rays = result.sum([](const Pass& p) { return p.result.n_rays; });

@@ -28,7 +28,7 @@ constexpr double kMostTime = 0.5, kLongSeconds = 5;
 
 double fall_of(const RenderOptions& options) {
   if (options.settings.denoising.denoises()) return kFallOfDenoised;
-  return estimator_of(options).passes == EstimatorPasses::kPair ? kFallOfPairs : kFallOfMeans;
+  return estimator_of(options).pair() ? kFallOfPairs : kFallOfMeans;
 }
 
 /// "4", "0.35": two digits.
@@ -93,8 +93,8 @@ void print_details(const RenderReport& report) {
     fmt::print(stderr, "integrator {} (variance x rays)\n", text_of(result.chosen, result.trials));
   if (const IntegratorReport of = result.integrator->report(); !of.summary.empty())
     fmt::print(stderr, "{} in {:.2f} s\n", of.summary, result.seconds.train);
-  const Estimator estimator = estimator_of(options);
-  if (estimator.passes != EstimatorPasses::kAny)
+  const Method estimator = estimator_of(options);
+  if (!estimator.is_mean())
     fmt::print(stderr, "{}{} in {:.2f} s\n", estimator.text,
                estimator.network.empty() ? "" : " with " + estimator.network, result.estimate_seconds());
   if (result.predicted) fmt::print(stderr, "{}\n", prediction_text(*result.predicted, result.image.risks));

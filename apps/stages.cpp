@@ -35,18 +35,18 @@ void add_stages_option(CLI::App& command, std::string& folder) {
             "Folder for images of each step (EXR and PNG), if the estimator has steps");
 }
 
-void check_stages(const std::string& folder, const Estimator& estimator) {
+void check_stages(const std::string& folder, const Method& estimator) {
   if (!folder.empty() && !estimator.stages)
     throw Error(ErrorCode::kUsage, "--save-stages: " + estimator.name + " has no single steps to show");
 }
 
-void save_stages(const std::string& folder, const Estimator& estimator, const GroupedImage& crn,
-                 const GroupedImage& independent, const PairSettings& settings, const ImagePlace& place) {
+void save_stages(const std::string& folder, const Method& method, const Samples& samples,
+                 const MethodSettings& settings, const ImagePlace& place) {
   if (folder.empty()) return;
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed) throw Error(ErrorCode::kIo, "--save-stages '" + folder + "': " + failed.message());
-  for (auto& [name, image] : estimator.stages(crn, independent, settings)) {
+  for (auto& [name, image] : method.stages(samples, settings)) {
     const std::string path = (std::filesystem::path(folder) / name).string();
     std::vector<ExrPlane> planes;
     if (image.channels == 3)

@@ -13,9 +13,9 @@
 #include "dependent_tests/dependent_tests.h"
 #include "estimators/control_variates.h"
 #include "estimators/cv_baseline.h"
-#include "estimators/estimator.h"
 #include "estimators/iduw.h"
 #include "estimators/iicv.h"
+#include "estimators/method.h"
 #include "estimators/pilot.h"
 #include "estimators/polynomials.h"
 #include "filters/neighbours.h"
@@ -203,10 +203,11 @@ void one_published_iicv(benchmark::State& state) {
 /// With its standard error calibrated by both halves of the samples: three runs of the estimator.
 void whole_calibrated(benchmark::State& state) {
   const Input& in = input();
-  const Estimator estimator = make_estimator("iicv");
-  PairSettings settings;
+  const Method estimator = make_estimator("iicv");
+  MethodSettings settings;
   settings.std_error = true;
-  for (auto _ : state) benchmark::DoNotOptimize(estimator.apply(in.crn, in.independent, settings).estimate.data.data());
+  for (auto _ : state)
+    benchmark::DoNotOptimize(estimator.image({in.crn, in.independent}, settings).estimate.data.data());
   count(state);
 }
 

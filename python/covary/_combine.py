@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from . import _covary
 from ._arguments import (Rule, array, check_some, checked, empty_or, flag, function, mapping_of, optional, path,
                          text, whole)
-from ._options import DEFAULT, OptionValue, check_no_passes, declared_rules, text_options
+from ._options import DEFAULT, DEFAULT_OF_PAIRS, OptionValue, check_no_passes, declared_rules, text_options
 from ._result import Result
 from .errors import UsageError
 
@@ -31,7 +31,7 @@ _LAYERS = optional(mapping_of(IMAGE, "a mapping from names to arrays"))
          samples=optional(whole(1, _covary.most_samples)), denoise=DENOISE, albedo=array, normal=array,
          denoising_albedo=array, denoising_normal=array, position=array, layers=_LAYERS, oidn=OIDN,
          std_error=optional(flag), force=flag, progress=optional(function))
-def combine(crn: Any, independent: Any, estimator: PairEstimator = "mixture", *, light: Film | None = None,
+def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, light: Film | None = None,
             counts: Any = None, samples: int | None = None, denoise: DenoiseMode | None = None, albedo: Any = None,
             normal: Any = None, denoising_albedo: Any = None, denoising_normal: Any = None, position: Any = None,
             layers: Mapping[str, Any] | None = None, oidn: str | PathLike[str] = "", std_error: bool | None = None,
@@ -69,7 +69,7 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "mixture", *,
     crn, independent = _groups_first("crn", crn, found), _groups_first("independent", independent, found)
     check_no_passes(options, "here are images that are rendered: counts= tells the samples that their pixels have")
     if estimator == DEFAULT and options:
-        estimator = "iicv"  # whose options they are
+        estimator = DEFAULT_OF_PAIRS  # type: ignore[assignment]  # whose options they are
     made = _covary.combine(crn, independent, None if counts is None else _counts(counts), light, albedo,
                            normal, denoising_albedo, denoising_normal, position, dict(layers or {}), estimator,
                            text_options(options, estimator), denoise or "", fspath(oidn), force, std_error, samples,

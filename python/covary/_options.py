@@ -20,7 +20,14 @@ def _registry() -> dict[str, dict[str, Any]]:
 
 
 #: The estimator that is used unless another is named.
-DEFAULT: str = next(known["name"] for known in _covary.estimators() if known["is_default"])
+DEFAULT: Any = next(name for name, known in _registry().items() if known["is_default"])
+#: The one whose image it denoises where it is given a pair.
+DEFAULT_OF_PAIRS: str = next(name for name, known in _registry().items() if known["is_default_of_pairs"])
+
+
+def estimators_of_films() -> tuple[str, ...]:
+    """Those that only read the finished films, and do not change what is sampled."""
+    return tuple(name for name, known in _registry().items() if known["passes"] != "samples" and not known["adaptive"])
 
 
 def passes_of(estimator: str) -> str | None:

@@ -16,7 +16,7 @@ from ._arguments import (
     text, whole,
 )
 from ._combine import DENOISE
-from ._options import DEFAULT, declared_rules, option_texts, passes_of, text_options, underscored
+from ._options import DEFAULT, declared_rules, option_texts, text_options, underscored
 from ._page import LivePage
 from ._result import BadSample, RenderResult, text_of_bad_samples
 from .errors import BadSamplesWarning, UsageError
@@ -131,7 +131,7 @@ SPP = whole(1, _covary.most_samples)
 PROGRESS = optional(either("a function, or True", flag, function))
 
 
-def _check_together(estimator: str | None, given: Mapping[str, Any]) -> None:
+def _check_together(given: Mapping[str, Any]) -> None:
     """Raises UsageError for arguments that have no effect in this combination."""
     def needs(names: tuple[str, ...], others: tuple[str, ...], what: str) -> None:
         for name in names:
@@ -144,13 +144,6 @@ def _check_together(estimator: str | None, given: Mapping[str, Any]) -> None:
                           ("until", "until_relative"), ("until_p95", "until_relative")):
         if given[first] and given[second]:
             raise UsageError(f"found {first} and {second}; expected one of them")
-    passes = passes_of(estimator or DEFAULT)
-    if given["sampling"] is not None and passes not in ("any", None):
-        raise UsageError(f"sampling: found {given['sampling']!r} with estimator {estimator!r}, which chooses itself; "
-                         "it is an argument of estimator 'none'")
-    if given["split"] is not None and passes not in ("pair", None):
-        raise UsageError(f"split: found {given['split']!r} with estimator {estimator!r}; it is an argument of "
-                         "estimators with two passes")
 
 
 def _check_scene_arguments(scene: PathOrScene, options: Mapping[str, Any]) -> None:
@@ -218,10 +211,9 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     keywords: dict[str, Any] = dict(options)
     _check_scene_arguments(scene, keywords)
     check_names(keywords, render.rules)  # type: ignore[attr-defined]
-    _check_together(estimator, {"resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "preview": preview,
-                                "output": output, "passes": passes, "until": until, "until_p95": until_p95,
-                                "until_relative": until_relative,
-                                "sampling": keywords.get("sampling"), "split": split})
+    _check_together({"resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "preview": preview,
+                     "output": output, "passes": passes, "until": until, "until_p95": until_p95,
+                     "until_relative": until_relative})
     declared = {name.replace("_", "-"): keywords.pop(name) for name in _DECLARED if name in keywords}
     texts = text_options(keywords, estimator or DEFAULT)
     chosen = scene if isinstance(scene, Scene) else Scene.load(scene, integrator=integrator)

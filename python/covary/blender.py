@@ -65,7 +65,7 @@ _SCENE = optional(instance("a bpy.types.Scene", lambda value: hasattr(value, "cy
 
 @checked(scene=_SCENE, spp=SPP, seed=SEED, groups=whole(3, _covary.most_groups), estimator=text, change=flag,
          progress=optional(function))
-def render(scene: Any = None, spp: int = 192, seed: int = 0, *, groups: int = 12, estimator: PairEstimator = "mixture",
+def render(scene: Any = None, spp: int = 192, seed: int = 0, *, groups: int = 12, estimator: PairEstimator = DEFAULT,
            change: bool = True, progress: Progress | None = None, **options: OptionValue) -> BlenderResult:
     """Renders a Blender scene with Cycles and takes its noise out. By default all samples are independent, and the
     image is made as by covary.render(), guided by Cycles' albedo and normal; for estimators of two images, half of the

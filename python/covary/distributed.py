@@ -24,7 +24,7 @@ from ._cluster import CLIENT, SceneFiles, check_versions, dask, make_plugin, res
 from ._combine import Progress, check_options, combine, guides_of
 from ._experiment import experiment, main
 from ._frames import frames
-from ._options import DEFAULT, OptionValue, check_no_passes, option_texts
+from ._options import DEFAULT, OptionValue, check_no_passes, estimators_of_films, option_texts, passes_of
 from ._parts import Part, PartFolder, Rendered
 from ._render import SCENE, SEED, SPP, Scene, report_bad_samples
 from ._render import render as render_here
@@ -38,10 +38,9 @@ if TYPE_CHECKING:
 
 __all__ = ["ClusterResult", "SceneFiles", "experiment", "frames", "main", "render"]
 
-#: Estimators that only use the finished films, and do not change what is sampled.
-_ESTIMATORS = (DEFAULT, "iicv", "cv-baseline", "iduw", "none")
+_ESTIMATORS = estimators_of_films()
 #: Those of one pass.
-_OF_ONE_IMAGE = (None, DEFAULT, "none")
+_OF_ONE_IMAGE = (None, *(name for name in _ESTIMATORS if passes_of(name) != "pair"))
 #: Options of an image made from one pass.
 _OF_ONE_PASS = ("denoise", "oidn")
 #: Keywords of covary.render() that say what is sampled.

@@ -272,7 +272,7 @@ _INTEGRATOR = optional(instance("an Integrator of Mitsuba, its name, or a dictio
 @checked(scene=_SCENE, spp=SPP, seed=SEED, integrator=_INTEGRATOR, sensor=whole(0), groups=whole(3, most_groups),
          estimator=text, aovs=flag, progress=optional(function))
 def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: int = 0, *, groups: int = 12,
-           estimator: PairEstimator = "mixture", aovs: bool = False, progress: Progress | None = None,
+           estimator: PairEstimator = DEFAULT, aovs: bool = False, progress: Progress | None = None,
            **options: OptionValue) -> MitsubaResult:
     """Renders a scene with Mitsuba and takes its noise out. By default all samples are independent, and the image is
     made as by covary.render(); for estimators of two images, half of the samples have common random numbers.

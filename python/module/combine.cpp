@@ -175,7 +175,7 @@ DenoisingChoice denoising_of(const std::string& estimator, const std::string& mo
 /// The guides of --denoise.
 struct GuideImages {
   Image albedo, normal, denoising_albedo, denoising_normal, position;
-  GuideImages(const Beside& beside, const Estimator& estimator, const Input& image) {
+  GuideImages(const Beside& beside, const Method& estimator, const Input& image) {
     const std::string shape = fmt::format("{}, {}, 3", image.height(), image.width());
     const auto take = [&](nb::handle array, const char* name, Image& to) {
       if (array.is_none()) return;
@@ -214,8 +214,8 @@ const Film* film_of(nb::handle light) {
 }
 
 /// The estimator for two images, or for an independent one that is denoised.
-Estimator estimator_of(bool is_pair, const std::string& name, const OptionValues& options,
-                       const DenoisingChoice& denoising) {
+Method estimator_of(bool is_pair, const std::string& name, const OptionValues& options,
+                    const DenoisingChoice& denoising) {
   if (name == kDefaultEstimator && (is_pair || denoising.denoises()))
     return make_default_estimator(is_pair, options, denoising);
   if (is_pair) return with_denoising(make_pair_estimator(name, options), denoising);
@@ -236,10 +236,10 @@ nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, c
   CombineRequest& request = pair.request;
   request.estimator = estimator_of(pair.crn.has_value(), arguments.estimator, arguments.options,
                                    denoising_of(arguments.estimator, arguments.denoise, arguments.oidn));
-  const Estimator& estimator = request.estimator;
+  const Method& estimator = request.estimator;
   const bool has_counts = !beside.counts.is_none();
   request.settings =
-      pair_settings(estimator, estimator.needs_sample_count || !has_counts ? arguments.samples : std::nullopt,
+      pair_settings(estimator, needs_sample_count(estimator) || !has_counts ? arguments.samples : std::nullopt,
                     pair.crn_samples(), arguments.std_error.value_or(estimator.predicts_error));
   const GuideImages guides(beside, estimator, pair.independent);
   request.settings.guides = guides.view();
@@ -276,28 +276,12 @@ nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, c
   return d;
 }
 
-/// Values of groups that differ from pixel to pixel and from `step` to `step`.
-std::vector<float> some_values(size_t n, size_t step) {
-  std::vector<float> values(n);
-  for (size_t i = 0; i < n; ++i) values[i] = 1 + 0.01f * static_cast<float>(i * step % 101);
-  return values;
-}
-
-/// Throws what combine() would throw for the options with any images, by combining two of a few pixels: the range of
-/// some options is checked only when the image is made.
+/// Throws what combine() would throw for the options with any images.
 void check_pair_estimator(const std::string& name, const OptionValues& options, const std::string& denoise,
                           const std::string& oidn) {
-  constexpr int kSide = 8, kGroups = 24;
-  const Estimator estimator = estimator_of(true, name, options, denoising_of(name, denoise, oidn));
-  const std::optional<int> samples = estimator.needs_sample_count ? std::optional(kGroups) : std::nullopt;
-  const PairSettings settings = pair_settings(estimator, samples, kGroups, estimator.predicts_error);
-  const std::vector<float> first = some_values(kSide * kSide * kGroups * 3, 37),
-                           second = some_values(kSide * kSide * kGroups * 3, 53);
-  run_work(
-      [&](WorkState&) {
-        estimator.apply({kSide, kSide, kGroups, first.data()}, {kSide, kSide, kGroups, second.data()}, settings);
-      },
-      nb::none());
+  const Method estimator = estimator_of(true, name, options, denoising_of(name, denoise, oidn));
+  const bool needs_count = needs_sample_count(estimator);
+  pair_settings(estimator, needs_count ? std::optional(1) : std::nullopt, 1, estimator.predicts_error);
 }
 
 nb::object correlation(const Correlation& c) {

@@ -30,18 +30,10 @@ const char* name_of(Option::Type type) {
   return "";
 }
 
-const char* name_of(EstimatorPasses passes) {
-  switch (passes) {
-    case EstimatorPasses::kPair:
-      return "pair";
-    case EstimatorPasses::kSamples:
-      return "samples";
-    case EstimatorPasses::kIndependent:
-      return "independent";
-    case EstimatorPasses::kAny:
-      return "any";
-  }
-  return "";
+const char* passes_of(const Method& method) {
+  if (method.pair()) return "pair";
+  if (method.pixel_pass()) return "samples";
+  return method.is_mean() ? "any" : "independent";
 }
 
 bool is_adaptive_option(const std::string& name) {
@@ -70,13 +62,15 @@ nb::list list_of(const std::vector<Option>& options) {
 nb::list estimators() {
   nb::list list;
   for (const std::string& name : estimator_names()) {
-    const Estimator estimator = make_estimator(name);
+    const Method estimator = make_estimator(name);
     nb::dict d;
     d["name"] = name;
     d["summary"] = estimator.summary;
-    d["passes"] = name_of(estimator.passes);
+    d["passes"] = passes_of(estimator);
     d["predicts_error"] = estimator.predicts_error;
     d["is_default"] = name == kDefaultEstimator;
+    d["is_default_of_pairs"] = name == kDefaultOfPairs;
+    d["adaptive"] = estimator.adaptive.has_value();
     d["denoises"] = can_be_denoised(estimator);
     d["fewest_groups"] = estimator.fewest_groups;
     d["options"] = list_of(options_of_estimator(name));

@@ -77,7 +77,9 @@ struct Choice {
 Plan plan_of(const RenderSettings& settings, const Choice& choice) {
   if (choice.films_only && settings.request.splits_layers())
     throw Error(ErrorCode::kUsage, "layers: films_only=True makes no image that they would be parts of");
-  return render_plan(settings, choice.of_estimator);
+  const Plan plan = render_plan(settings, choice.of_estimator);
+  check_given(choice.values, settings, *plan.method);
+  return plan;
 }
 
 /// Adds the first samples of a pass that count as black, with the commands that replay them.
@@ -149,7 +151,7 @@ nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Opti
       made_of(scene.content_hash, {choice.values, of_integrator, choice.of_estimator});
   if (request.load_training.empty()) take_training(scene, request);
   std::vector<std::string> warnings(scene.warnings);
-  if (const std::string text = advice(settings, *plan.estimator, scene); !text.empty() && !choice.films_only)
+  if (const std::string text = advice(settings, *plan.method, scene); !text.empty() && !choice.films_only)
     warnings.push_back(as_arguments(text));
   std::mutex mutex;
   RenderResult result;
@@ -192,8 +194,8 @@ nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Opti
   given.insert(of_integrator.begin(), of_integrator.end());
   if (const std::string text = missing_network(settings.denoising); !text.empty() && !choice.films_only)
     warnings.push_back(as_arguments(text));
-  nb::dict made = dict_of(std::move(result), choice.films_only ? kNoEstimator : plan.estimator->text, warnings, given);
-  made["network"] = choice.films_only ? "" : plan.estimator->network;
+  nb::dict made = dict_of(std::move(result), choice.films_only ? kNoEstimator : plan.method->text, warnings, given);
+  made["network"] = choice.films_only ? "" : plan.method->network;
   return made;
 }
 
@@ -217,21 +219,19 @@ nb::dict image_of_films(const Options& values, const Options& of_estimator, nb::
       [&](WorkState& state) {
         const Stopwatch watch;
         Beside beside;
-        if (plan.estimator->reads_guides) beside.guides = guides_among(result.aovs);
-        const auto estimate = [&] {
-          result.image = plan.estimate(result.passes, 0, result.passes[0].film.height(), beside);
-          finish(result.image, nullptr);
-        };
+        if (plan.method->reads_guides) beside.guides = guides_among(result.aovs);
+        const int height = result.passes[0].film.height();
+        const auto estimate = [&] { result.image = finish(image_of(plan, result.passes, 0, height, beside)); };
         if (!run_stoppable(state, estimate)) return;
-        result.predicted = predicted_error(result.image, result.samples_per_pixel(), plan.estimator->reliable_samples);
+        result.predicted = predicted_error(result.image, result.samples_per_pixel(), plan.method->reliable_samples);
         if (result.predicted) result.predicted_blocks = predicted_blocks(result.image);
-        if (plan.film_is_image()) result.image.estimate = {};
+        if (plan.makes_film()) result.image.estimate = {};
         result.seconds.estimate = watch.seconds();
       },
       nb::none());
   result.complete = true;
-  nb::dict made = dict_of(std::move(result), plan.estimator->text, {}, values);
-  made["network"] = plan.estimator->network;
+  nb::dict made = dict_of(std::move(result), plan.method->text, {}, values);
+  made["network"] = plan.method->network;
   return made;
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <limits>
 #include <memory>
+#include <utility>
 
 #include "combine/difference_checks.h"
 #include "combine/light_film.h"
@@ -19,7 +20,6 @@
 #include "filters/regression.h"
 #include "filters/residual_correction.h"
 #include "risk/error_interval.h"
-#include "risk/held_out_error.h"
 #include "risk/predicted_error.h"
 
 namespace covary {
@@ -75,37 +75,37 @@ void add_risk_of_light(double before, EstimatorResult& result) {
 double layer_bytes(int groups) { return 3 * sizeof(float) * (2.0 * groups + kImagesOfLayer); }
 
 /// Estimates the whole image with all layers.
-EstimatorResult estimate_layers(const CombineRequest& request, std::map<std::string, Image>& layers) {
-  if (!request.estimator.splits_layers)
+MethodImage estimate_layers(const CombineRequest& request, std::map<std::string, Image>& layers) {
+  if (!request.estimator.splits_layers())
     throw Error(ErrorCode::kUsage,
                 fmt::format("{} makes no `layers`; denoised independent images have them", request.estimator.text));
   const GroupedImage independent = request.independent.all();
   const WholeLayers whole(independent, request.layers);
-  PairSettings settings = request.settings;
+  MethodSettings settings = request.settings;
   settings.layers = whole.view();
-  EstimatorResult result = request.estimator.apply(rows_of(request.crn, 0, independent.height), independent, settings);
+  MethodImage result = request.estimator.image({rows_of(request.crn, 0, independent.height), independent}, settings);
   for (size_t i = 0; i < result.layers.size(); ++i) layers[whole.view()[i].name] = std::move(result.layers[i]);
   result.layers.clear();
   return result;
 }
 
-EstimatorResult estimate(const CombineRequest& request) {
-  const Estimator& estimator = request.estimator;
+MethodImage estimate(const CombineRequest& request) {
+  const Method& estimator = request.estimator;
   const int height = request.independent.height, in_memory = rows_in_memory(request);
   if (needs_whole(request) || in_memory >= height)
-    return estimator.apply(rows_of(request.crn, 0, height), request.independent.all(), request.settings);
-  if (estimator.apply_in_rows) {
+    return estimator.image({rows_of(request.crn, 0, height), request.independent.all()}, request.settings);
+  if (estimator.image_in_rows) {
     const auto rows = [&](int first, int n) {
-      return PairInRows::Rows{rows_of(request.crn, first, n), request.independent.rows(first, n)};
+      return Samples{rows_of(request.crn, first, n), request.independent.rows(first, n)};
     };
-    return estimator.apply_in_rows({request.independent.width, height, in_memory, rows}, request.settings);
+    return estimator.image_in_rows({request.independent.width, height, in_memory, rows}, request.settings);
   }
   const int step = std::max(kFewestRows, in_memory - 2 * estimator.reach) / kResidualCell * kResidualCell;
-  EstimatorResult whole;
+  MethodImage whole;
   for (int y = 0; y < height; y += step) {
     const int n = std::min(step, height - y);
     const Band band = band_around(request, y, y + n);
-    const EstimatorResult part = estimator.apply(band.crn, band.independent, request.settings);
+    const MethodImage part = estimator.image({band.crn, band.independent}, request.settings);
     long n_nonfinite = 0;  // without the surrounding rows, which belong to other bands
     finite_pixels(covary::rows_of(band.crn, y - band.first, n), covary::rows_of(band.independent, y - band.first, n),
                   n_nonfinite);
@@ -154,7 +154,7 @@ double most_memory_of(const CombineRequest& request) { return request.most_memor
 
 int rows_in_memory(const CombineRequest& request) {
   const int rows = rows_within(request, request.memory);
-  if (!request.estimator.apply_in_rows || needs_whole(request)) return rows;
+  if (!request.estimator.image_in_rows || needs_whole(request)) return rows;
   const int useful = kUsefulRows * request.estimator.reach;
   if (rows >= useful) return rows;
   return std::max(rows, std::min(useful, rows_within(request, most_memory_of(request))));
@@ -277,13 +277,13 @@ double predicted_relmse_of_mean(const GroupedSource& image, int rows) {
   return sum / image.height;
 }
 
-void finish(EstimatorResult& result, const GroupedImage* light) {
-  calibrate(result);
-  apply_interval(result);
-  if (!light) return;
+EstimatorResult finish(MethodImage image, const GroupedImage* light) {
+  EstimatorResult result = with_error(std::move(image));
+  if (!light) return result;
   const double before = result.risks ? predicted_relmse(result) : 0;
   add_light(*light, result);
   add_risk_of_light(before, result);
+  return result;
 }
 
 CombinedImage combine(const CombineRequest& given) {
@@ -299,8 +299,7 @@ CombinedImage combine(const CombineRequest& given) {
   request.independent = without(request.independent, combined.inputs.strays);
   combined.check_seconds = watch.lap();
 
-  combined.image = request.layers.empty() ? estimate(request) : estimate_layers(request, combined.layers);
-  finish(combined.image, nullptr);
+  combined.image = finish(request.layers.empty() ? estimate(request) : estimate_layers(request, combined.layers));
   const double before = combined.image.risks && request.light ? predicted_relmse(combined.image) : 0;
   if (request.light)
     for (int y = 0; y < request.light->height; y += kLightRows)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Combines two grouped images, or denoises an independent one: checks the inputs, estimates, calibrates the error, adds
-// the light film. The one pipeline of `covary combine`, Python and C++; renders end with its last two steps.
+// Combines two grouped images, or denoises an independent one: checks the inputs, estimates the image and its error,
+// adds the light film. The one pipeline of `covary combine`, Python and C++; renders end with its last two steps.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,7 @@
 #include "combine/grouped_source.h"
 #include "combine/input_checks.h"
 #include "combine/layer_sources.h"
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 #include "filters/stray_values.h"
 #include "risk/predicted_error.h"
 
@@ -27,12 +27,12 @@ struct InputFindings {
 };
 
 struct CombineRequest {
-  std::optional<GroupedSource> crn;  ///< none for an estimator with EstimatorPasses::kIndependent
+  std::optional<GroupedSource> crn;  ///< none for a method of one pass
   GroupedSource independent;
   std::optional<GroupedSource> light;  ///< a light film (film/splat_layer.h), to be added
   std::vector<LayerSource> layers;     ///< parts of the independent image, for estimators that split them
-  Estimator estimator;                 ///< of a pair of images, or of an independent one
-  PairSettings settings;
+  Method estimator;                    ///< of a pair of images, or of an independent one
+  MethodSettings settings;
   bool force = false;  ///< combine even if there are errors among the findings
   /// Memory limit in bytes: larger images are combined in bands of rows, with the same bits, if the estimator's reach
   /// is limited.
@@ -81,8 +81,8 @@ struct Band {
 /// Rows first … last - 1 and the estimator's reach on both sides, so that bands have the bits of the whole.
 Band band_around(const CombineRequest& request, int first, int last);
 
-/// The last steps for every image that an estimator made from films: held-out samples calibrate its standard error, and
-/// the mean of the light film's rows, if any, is added.
-void finish(EstimatorResult& result, const GroupedImage* light);
+/// The last steps for every image that a method made from films: its error follows from what the samples tell of it
+/// (risk/error_interval.h), and the mean of the light film's rows, if any, is added.
+EstimatorResult finish(MethodImage image, const GroupedImage* light = nullptr);
 
 }  // namespace covary

@@ -13,7 +13,6 @@
 #include "estimators/mean.h"
 #include "estimators/test_images.h"
 #include "risk/error_interval.h"
-#include "risk/held_out_error.h"
 #include "risk/predicted_error.h"
 #include "support/files.h"
 
@@ -48,15 +47,13 @@ TEST(Combine, PredictsTheErrorOfTheMeanInBands) {
   for (const int rows : {7, kHeight, 2 * kHeight}) EXPECT_NEAR(predicted_relmse_of_mean(source, rows), whole, 1e-12);
 }
 
-TEST(Combine, IsEstimateCalibrationAndPrediction) {
+TEST(Combine, IsEstimateErrorAndPrediction) {
   const Images images;
   const CombineRequest request = images.request();
   const CombinedImage combined = combine(request);
-  EstimatorResult expected = request.estimator.apply(images.crn.view(), images.independent.view(), request.settings);
-  const std::vector<float> uncalibrated = expected.std_error.data;
-  calibrate(expected);
-  EXPECT_NE(expected.std_error.data, uncalibrated);
-  apply_interval(expected);
+  const MethodImage image = request.estimator.image({images.crn.view(), images.independent.view()}, request.settings);
+  const EstimatorResult expected = with_error(image);
+  EXPECT_NE(expected.std_error.data, image.std_error.data);
   EXPECT_EQ(combined.image.estimate.data, expected.estimate.data);
   EXPECT_EQ(combined.image.std_error.data, expected.std_error.data);
   EXPECT_EQ(combined.predicted->relmse, predicted_relmse(expected));
@@ -108,9 +105,9 @@ TEST(Combine, AnIndependentImageAloneIsDenoised) {
   options.use_oidn = false;
   request.estimator = with_denoising(make_estimator("none"), options);
   const CombinedImage combined = combine(request);
-  EstimatorResult expected = request.estimator.apply({}, images.independent.view(), request.settings);
-  EXPECT_FALSE(expected.interval);
-  finish(expected, nullptr);
+  const MethodImage image = request.estimator.image({{}, images.independent.view()}, request.settings);
+  EXPECT_FALSE(image.interval);
+  const EstimatorResult expected = finish(image);
   EXPECT_EQ(combined.image.estimate.data, expected.estimate.data);
   EXPECT_EQ(combined.predicted->relmse, predicted_relmse(expected));
   EXPECT_TRUE(combined.image.interval) << "the error of a mean that was denoised has bounds";

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "combine/grouped_source.h"
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 
 namespace covary {
 

@@ -95,30 +95,31 @@ InputReport unchecked_report() {
   return report;
 }
 
-std::vector<std::string> estimators_with_samples() {
-  return estimators_where([](const Estimator& e) { return e.needs_sample_count; });
-}
+bool needs_sample_count(const Method& method) { return method.pair() && method.pair()->needs_sample_count; }
 
-PairSettings pair_settings(const Estimator& estimator, std::optional<int> samples, double known_samples,
-                           bool std_error) {
+std::vector<std::string> estimators_with_samples() { return estimators_where(needs_sample_count); }
+
+MethodSettings pair_settings(const Method& estimator, std::optional<int> samples, double known_samples,
+                             bool std_error) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   const std::string& name = estimator.name;
-  if (samples && !estimator.needs_sample_count)
+  const bool needs_count = needs_sample_count(estimator);
+  if (samples && !needs_count)
     usage(fmt::format("`samples` is an option of `counts` and `estimator` {}, not of {}",
                       fmt::join(estimators_with_samples(), ", "), name));
   if (std_error && !estimator.predicts_error) usage("`error`: " + name + " does not estimate its error");
   const int64_t count = samples ? *samples : std::llround(known_samples);
-  if (estimator.needs_sample_count && count == 0)
+  if (needs_count && count == 0)
     usage("`estimator` " + name + " needs `samples` N, the samples per pixel of the CRN image");
-  PairSettings settings;
+  MethodSettings settings;
   settings.crn_samples = count;
   settings.std_error = std_error;
   return settings;
 }
 
 std::string needs_samples_text(const std::string& name) {
-  for (const EstimatorPlugin& plugin : estimator_plugins())
-    if (name == plugin.name && make_estimator(name).passes == EstimatorPasses::kSamples)
+  for (const MethodPlugin& plugin : estimator_plugins())
+    if (name == plugin.name && make_estimator(name).pixel_pass())
       return fmt::format(
           "{0} are fitted to the samples of each pixel, which images do not hold; use 'covary render "
           "SCENE --estimator {0}'",
@@ -126,10 +127,10 @@ std::string needs_samples_text(const std::string& name) {
   return "";
 }
 
-Estimator make_pair_estimator(const std::string& name, const OptionValues& values) {
+Method make_pair_estimator(const std::string& name, const OptionValues& values) {
   if (const std::string text = needs_samples_text(name); !text.empty()) throw Error(ErrorCode::kUsage, text);
-  Estimator estimator = make_estimator(name, values);
-  if (estimator.passes != EstimatorPasses::kPair)
+  Method estimator = make_estimator(name, values);
+  if (!estimator.pair())
     throw Error(ErrorCode::kUsage, fmt::format("estimator '{}' is not one of two images; those are {}", name,
                                                fmt::join(pair_estimator_names(), ", ")));
   return estimator;

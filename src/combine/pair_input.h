@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "combine/input_checks.h"
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 #include "film/exr.h"
 #include "film/written_by.h"
 #include "settings/settings.h"
@@ -49,16 +49,17 @@ bool lacks_samples(const GroupedImage& image);
 /// The report for such images, which an adaptive estimator may accept: they were not checked.
 InputReport unchecked_report();
 
+/// Whether it needs the number of samples of the CRN image.
+bool needs_sample_count(const Method& method);
 /// Names of the estimators that need the number of samples of the CRN image.
 std::vector<std::string> estimators_with_samples();
 /// `samples`: per pixel of the CRN image, if given by the caller; `known_samples`: according to the image, 0 if
 /// unknown. Throws Error(kUsage) for a setting that the estimator does not have.
-PairSettings pair_settings(const Estimator& estimator, std::optional<int> samples, double known_samples,
-                           bool std_error);
+MethodSettings pair_settings(const Method& estimator, std::optional<int> samples, double known_samples, bool std_error);
 
 /// Why the estimator cannot be applied to images; empty if it can, or if there is no such estimator.
 std::string needs_samples_text(const std::string& name);
 /// make_estimator() for two-image estimators. Throws Error(kUsage) for any other.
-Estimator make_pair_estimator(const std::string& name, const OptionValues& values);
+Method make_pair_estimator(const std::string& name, const OptionValues& values);
 
 }  // namespace covary

@@ -10,21 +10,20 @@
 #include "estimators/cv_baseline.h"
 #include "estimators/iduw.h"
 #include "estimators/iicv.h"
-#include "estimators/mean.h"
 #include "estimators/polynomials.h"
 #include "risk/held_out_error.h"
 #include "settings/option_names.h"
 
 namespace covary {
 
-std::span<const EstimatorPlugin> estimator_plugins() {
-  static constexpr EstimatorPlugin kPlugins[] = {
+std::span<const MethodPlugin> estimator_plugins() {
+  static constexpr MethodPlugin kPlugins[] = {
       {kMixture, make_mixture},
       {kIicv, make_iicv},
-      {"cv-baseline", make_cv_baseline},
-      {"iduw", make_iduw},
-      {"dependent-tests", make_dependent_tests},
-      {"polynomials", make_polynomials},
+      {kCvBaseline, make_cv_baseline},
+      {kIduw, make_iduw},
+      {kDependentTests, make_dependent_tests},
+      {kPolynomials, make_polynomials},
       {kMeanName, make_none},
   };
   return kPlugins;
@@ -32,8 +31,8 @@ std::span<const EstimatorPlugin> estimator_plugins() {
 
 namespace {
 
-const EstimatorPlugin& plugin_named(const std::string& name) {
-  for (const EstimatorPlugin& plugin : estimator_plugins())
+const MethodPlugin& plugin_named(const std::string& name) {
+  for (const MethodPlugin& plugin : estimator_plugins())
     if (name == plugin.name) return plugin;
   const std::vector<std::string> names = estimator_names();
   throw Error(ErrorCode::kUsage, fmt::format("no estimator is named '{}'{}; expected {}", name,
@@ -42,13 +41,13 @@ const EstimatorPlugin& plugin_named(const std::string& name) {
 
 }  // namespace
 
-Estimator make_estimator(const std::string& name, const OptionValues& values) {
-  const EstimatorPlugin& plugin = plugin_named(name);
+Method make_estimator(const std::string& name, const OptionValues& values) {
+  const MethodPlugin& plugin = plugin_named(name);
   const std::vector<Option> own = options_of_estimator(name);
   for (const auto& [option, value] : values)
     if (!find_option(own, option)) refuse_option("estimator", name, own, option, estimators_with_option(option));
   Settings parameters(values);
-  Estimator estimator = plugin.make(parameters);
+  Method estimator = plugin.make(parameters);
   estimator.name = estimator.text = name;
   for (const Option& option : own) {
     const auto given = values.find(option.name);
@@ -61,12 +60,12 @@ Estimator make_estimator(const std::string& name, const OptionValues& values) {
 
 std::vector<std::string> estimator_names() {
   std::vector<std::string> names;
-  for (const EstimatorPlugin& plugin : estimator_plugins()) names.emplace_back(plugin.name);
+  for (const MethodPlugin& plugin : estimator_plugins()) names.emplace_back(plugin.name);
   return names;
 }
 
 std::vector<std::string> pair_estimator_names() {
-  return estimators_where([](const Estimator& e) { return e.passes == EstimatorPasses::kPair; });
+  return estimators_where([](const Method& e) { return e.pair() != nullptr; });
 }
 
 std::vector<Option> options_of_estimator(const std::string& name) {
@@ -82,7 +81,7 @@ std::vector<Option> options_of_estimators(const std::vector<std::string>& names)
   return merged_options(names, lists);
 }
 
-Estimator with_denoising(const Estimator& base, const DenoisingChoice& choice) {
+Method with_denoising(const Method& base, const DenoisingChoice& choice) {
   MixedDenoisingOptions options;
   options.mode = denoise_mode(choice.mode);
   if (options.mode != DenoiseMode::kNone && !can_be_denoised(base))
@@ -99,17 +98,17 @@ std::string usual_denoising(const std::string& estimator) {
   return estimator == kDefaultEstimator ? DenoisingChoice::kAuto : DenoisingChoice::kNone;
 }
 
-Estimator make_default_estimator(bool is_pair, const OptionValues& values, const DenoisingChoice& choice) {
-  return with_denoising(make_estimator(is_pair ? kIicv : kDefaultEstimator, values), choice);
+Method make_default_estimator(bool is_pair, const OptionValues& values, const DenoisingChoice& choice) {
+  return with_denoising(make_estimator(is_pair ? kDefaultOfPairs : kDefaultEstimator, values), choice);
 }
 
-Estimator make_default_estimator() {
+Method make_default_estimator() {
   return make_default_estimator(false, {}, {usual_denoising(kDefaultEstimator), "", {}});
 }
 
 std::vector<std::string> estimators_with_option(const std::string& option) {
   std::vector<std::string> names;
-  for (const EstimatorPlugin& plugin : estimator_plugins())
+  for (const MethodPlugin& plugin : estimator_plugins())
     if (find_option(options_of_estimator(plugin.name), option)) names.emplace_back(plugin.name);
   return names;
 }

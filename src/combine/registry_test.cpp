@@ -36,15 +36,15 @@ const test::Grouped& independent() {
 }
 
 std::vector<float> made(const std::string& name, const OptionValues& values,
-                        const PairSettings& settings = {48, true}) {
-  return make_estimator(name, values).apply(crn().view(), independent().view(), settings).estimate.data;
+                        const MethodSettings& settings = {48, true}) {
+  return make_estimator(name, values).image({crn().view(), independent().view()}, settings).estimate.data;
 }
 
 TEST(EstimatorRegistry, BeginsWithTheDefaultAndRepeatsNothing) {
   const std::vector<std::string> names = estimator_names();
   EXPECT_EQ(names.front(), kDefaultEstimator);
   EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), names.size());
-  EXPECT_EQ(make_estimator(kNoEstimator).passes, EstimatorPasses::kAny);
+  EXPECT_TRUE(make_estimator(kNoEstimator).is_mean());
 }
 
 /// Options with the same name have the same meaning on the command line, whichever estimators have them.
@@ -73,7 +73,7 @@ TEST(EstimatorRegistry, DefaultsAreThoseOfTheOptions) {
   EXPECT_EQ(made("dependent-tests", {}), dependent_tests(g, h).estimate.data);
   EXPECT_EQ(made("dependent-tests", {{"paper", ""}}),
             dependent_tests(g, h, DependentTestsOptions::paper()).estimate.data);
-  EXPECT_EQ(make_estimator("polynomials").dimensions, PolynomialsOptions().dimensions);
+  EXPECT_EQ(make_estimator("polynomials").pixel_pass()->dimensions, PolynomialsOptions().dimensions);
 }
 
 bool has(const std::vector<Option>& options, const std::string& name) {
@@ -121,7 +121,7 @@ TEST(EstimatorRegistry, ValuesReachTheOptions) {
   DependentTestsOptions exact;
   exact.window = 5;
   EXPECT_EQ(made("dependent-tests", {{"window", "5"}}), dependent_tests(g, h, exact).estimate.data);
-  EXPECT_EQ(make_estimator("polynomials").film_settings, "polynomials dimensions=4");
+  EXPECT_EQ(make_estimator("polynomials").pixel_pass()->film_settings, "polynomials dimensions=4");
   EXPECT_EQ(make_estimator("iicv", {{"paper", ""}, {"k", "50"}}).text, "iicv --paper --set k=50");
 }
 
@@ -131,33 +131,32 @@ TEST(EstimatorRegistry, EachEstimatorDoesWhatItSays) {
     return common ? test::crn_image(kWidth, kHeight, n, seed) : test::independent_image(kWidth, kHeight, n, seed);
   };
   for (const std::string& name : pair_estimator_names()) {
-    const Estimator estimator = make_estimator(name);
+    const Method estimator = make_estimator(name);
     SCOPED_TRACE(name);
-    EXPECT_NEAR(estimator.split[0] + estimator.split[1], 1, 1e-12);
     const auto run = [&](int n) {
       const test::Grouped g = groups(n, 1, true), h = groups(n, 1, false);
-      return estimator.apply(g.view(), h.view(), {4 * n, estimator.predicts_error});
+      return estimator.image({g.view(), h.view()}, {4 * n, estimator.predicts_error});
     };
     const EstimatorResult result = run(estimator.fewest_groups);
     EXPECT_EQ(result.estimate.data.size(), size_t{kWidth} * kHeight * 3);
     EXPECT_EQ(!result.std_error.data.empty(), estimator.predicts_error);
     EXPECT_THROW(run(estimator.fewest_groups - 1), Error);
-    if (!estimator.explain) continue;
-    EXPECT_FALSE(estimator.explain(crn().view(), independent().view(), 5, 5).empty());
+    if (!estimator.pair()->explain) continue;
+    EXPECT_FALSE(estimator.pair()->explain(crn().view(), independent().view(), 5, 5).empty());
   }
 }
 
 TEST(EstimatorRegistry, AdaptiveEstimatorsHaveTheirNumbers) {
-  const Estimator usual = make_estimator("dependent-tests");
+  const Method usual = make_estimator("dependent-tests");
   ASSERT_TRUE(usual.adaptive);
   EXPECT_EQ(usual.adaptive->counts.allocation, Allocation::kLeastError);
   EXPECT_FALSE(usual.adaptive->counts.classes);
-  const Estimator paper = make_estimator("dependent-tests", {{"paper", ""}});
+  const Method paper = make_estimator("dependent-tests", {{"paper", ""}});
   EXPECT_EQ(paper.adaptive->counts.allocation, Allocation::kEqualError);
   EXPECT_TRUE(paper.adaptive->counts.classes);
   EXPECT_EQ(paper.adaptive->counts.min_spp, 0);
   EXPECT_FALSE(make_estimator("none").adaptive);
-  const Estimator plain = make_estimator("none", {{"adaptive", ""}, {"dependent-spp", "7"}, {"max-spp", "30"}});
+  const Method plain = make_estimator("none", {{"adaptive", ""}, {"dependent-spp", "7"}, {"max-spp", "30"}});
   ASSERT_TRUE(plain.adaptive);
   EXPECT_EQ(plain.adaptive->first_spp, 7);
   const CountOptions& counts = plain.adaptive->counts;
@@ -170,7 +169,7 @@ TEST(EstimatorRegistry, AdaptiveEstimatorsHaveTheirNumbers) {
   EXPECT_EQ(message("dependent-tests", {{"max-spp", "0"}}), "`max-spp` '0': expected a whole number of at least 1");
   EXPECT_TRUE(contains(message("iduw", {{"max-spp", "1"}}),
                        "is an option of `estimator` mixture, iicv, dependent-tests, none"));
-  const Estimator iicv = make_estimator("iicv", {{"adaptive", ""}, {"max-spp", "99"}});
+  const Method iicv = make_estimator("iicv", {{"adaptive", ""}, {"max-spp", "99"}});
   ASSERT_TRUE(iicv.adaptive);
   EXPECT_EQ(iicv.adaptive->counts.max_spp, 99);
   EXPECT_TRUE(iicv.adaptive->reads_groups);
@@ -178,14 +177,14 @@ TEST(EstimatorRegistry, AdaptiveEstimatorsHaveTheirNumbers) {
 }
 
 TEST(EstimatorRegistry, SamplesOfAPixel) {
-  const Estimator estimator = make_estimator("polynomials");
-  ASSERT_EQ(estimator.passes, EstimatorPasses::kSamples);
+  const Method estimator = make_estimator("polynomials");
+  ASSERT_TRUE(estimator.pixel_pass());
   const std::vector<Spectrum> values(40, Spectrum(2.0f));
   std::vector<float> coordinates;
   for (uint64_t i = 0; i < 160; ++i) coordinates.push_back(0.5f + test::noise(1, i, 0));
-  EXPECT_EQ(estimator.estimate_pixel(values, coordinates).r, 2.0f);
-  EXPECT_TRUE(estimator.check_samples(16).empty());
-  EXPECT_FALSE(estimator.check_samples(15).empty());
+  EXPECT_EQ(estimator.pixel_pass()->pixel(values, coordinates).r, 2.0f);
+  EXPECT_TRUE(estimator.pixel_pass()->check_samples(16).empty());
+  EXPECT_FALSE(estimator.pixel_pass()->check_samples(15).empty());
 }
 
 TEST(EstimatorRegistry, RangesAreThoseThatAreChecked) {
@@ -259,16 +258,16 @@ TEST(EstimatorRegistry, SaysWhatIsWrong) {
 
 std::string yes_or_no(bool value) { return value ? "yes" : "no"; }
 
-std::string row_of(const Estimator& e) {
-  const bool pair = e.passes == EstimatorPasses::kPair;
+std::string row_of(const Method& e) {
+  const bool pair = e.pair();
   const bool is_default = e.name == kDefaultEstimator;
-  const char* passes = is_default                              ? "independent, or CRN and independent"
-                       : pair                                  ? "CRN and independent"
-                       : e.passes == EstimatorPasses::kSamples ? "independent, all samples of a pixel"
-                                                               : "one of either kind";
+  const char* passes = is_default       ? "independent, or CRN and independent"
+                       : pair           ? "CRN and independent"
+                       : e.pixel_pass() ? "independent, all samples of a pixel"
+                                        : "one of either kind";
   const std::string combine = pair && e.reach < 0 ? "whole images" : pair || is_default ? "in bands" : "no";
   return fmt::format("| `{}` | {} | {} | {} | {} | {} |", e.name, passes, e.fewest_groups, yes_or_no(e.predicts_error),
-                     yes_or_no(e.explain != nullptr), combine);
+                     yes_or_no(pair && e.pair()->explain), combine);
 }
 
 std::string row_of(const Option& o) {

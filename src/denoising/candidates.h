@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "denoising/denoise.h"
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 #include "filters/planes.h"
 
 namespace covary {
@@ -44,7 +44,7 @@ struct CandidateMaker {
 
   std::vector<std::string> names;  ///< of the candidates, in order
   Make make;
-  /// The layers of one set of samples (PairSettings::layers, means without fireflies): for each candidate, the images
+  /// The layers of one set of samples (MethodSettings::layers, means without fireflies): for each candidate, the images
   /// of all layers. A filter's layers add up to the candidate, a network's only approximately. For
   /// CandidateBase::kMean.
   std::function<std::vector<std::vector<Image>>(const CandidateInput&, std::span<const Image> layers)> make_layers;

@@ -25,12 +25,12 @@ void make_finite(Image& image) {
     if (!std::isfinite(value)) value = 0;
 }
 
-DenoisingPart part_of_pair(const Estimator& base, const GroupedImage& crn, const GroupedImage& independent,
-                           PairSettings settings, const std::vector<unsigned char>& valid) {
+DenoisingPart part_of_pair(const Method& base, const GroupedImage& crn, const GroupedImage& independent,
+                           MethodSettings settings, const std::vector<unsigned char>& valid) {
   settings.std_error = true;
   settings.held_out = false;
   DenoisingPart part;
-  part.image = base.apply(crn, independent, settings);
+  part.image = base.image({crn, independent}, settings);
   part.independent = moments(independent, valid, 0, 0.0f);
   make_finite(part.image.estimate), make_finite(part.image.std_error);
   return part;
@@ -90,8 +90,8 @@ Image mean_image(const Moments& moments) {
   return image;
 }
 
-DenoisingParts parts_of_pair(const Estimator& base, const GroupedImage& crn, const GroupedImage& independent,
-                             const PairSettings& settings) {
+DenoisingParts parts_of_pair(const Method& base, const GroupedImage& crn, const GroupedImage& independent,
+                             const MethodSettings& settings) {
   DenoisingParts parts;
   parts.name = base.name;
   parts.groups = independent;
@@ -100,7 +100,7 @@ DenoisingParts parts_of_pair(const Estimator& base, const GroupedImage& crn, con
   parts.whole = part_of_pair(base, crn, independent, settings, parts.valid);
   for (int half : {0, 1}) {
     const HalfImage half_crn(crn, half), half_independent(independent, half);
-    PairSettings half_settings = settings;
+    MethodSettings half_settings = settings;
     half_settings.crn_samples = std::max<int64_t>(1, settings.crn_samples / 2);
     parts.halves[half] = part_of_pair(base, half_crn.view(), half_independent.view(), half_settings, parts.valid);
   }

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 #include "filters/planes.h"
 
 namespace covary {
@@ -42,8 +42,8 @@ struct DenoisingParts {
 Image mean_image(const Moments& moments);
 
 /// For a base estimator of two passes.
-DenoisingParts parts_of_pair(const Estimator& base, const GroupedImage& crn, const GroupedImage& independent,
-                             const PairSettings& settings);
+DenoisingParts parts_of_pair(const Method& base, const GroupedImage& crn, const GroupedImage& independent,
+                             const MethodSettings& settings);
 
 /// For independent samples alone: means of at least two groups. A few groups determine a variance poorly, so the
 /// variance between the groups of a pixel is shrunk towards that of the surrounding pixels, which counts as eight more

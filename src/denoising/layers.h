@@ -19,7 +19,7 @@
 
 #include "denoising/candidates.h"
 #include "denoising/denoising_parts.h"
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 
 namespace covary {
 

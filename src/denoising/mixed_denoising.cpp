@@ -16,7 +16,7 @@
 #include "denoising/mixture.h"
 #include "denoising/parts_mixture.h"
 #include "denoising/rows_denoising.h"
-#include "estimators/mean.h"
+#include "risk/plain_mean.h"
 
 namespace covary {
 namespace {
@@ -74,6 +74,8 @@ const std::vector<std::string>& denoise_mode_names() {
   return names;
 }
 
+bool lowers_bias(DenoiseMode mode) { return settings_of(mode).weighting.bias_share > 1; }
+
 DenoiseMode denoise_mode(const std::string& name) {
   for (const ModeSettings& mode : kModes)
     if (name == mode.name) return mode.mode;
@@ -130,7 +132,7 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
   MixedParts mixed = mix_parts(parts, makers, chosen);
   MixedDenoising out;
   out.names = names_of(makers);
-  EstimatorResult& result = out.result;
+  MethodImage& result = out.result;
   result = finish(mixed_rows(parts, mixed, makers, std_error || has_history), makers, parts.name);
   if (has_history) {  // last: the error above is that of the frame alone
     use_history(history, parts, makers, chosen, result.std_error, mixed, result.kept_samples);
@@ -145,8 +147,6 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
 }
 
 namespace {
-
-bool is_mean(const Estimator& estimator) { return estimator.passes == EstimatorPasses::kAny; }
 
 /// Whether there are enough samples for halves to compare candidates.
 bool can_be_mixed(const GroupedImage& image) {
@@ -180,13 +180,12 @@ MixedDenoising single_candidate(const GroupedImage& independent, const std::vect
   return out;
 }
 
-/// Shared by Estimator::apply and Estimator::stages.
-using Run = std::function<MixedDenoising(const GroupedImage& crn, const GroupedImage& independent,
-                                         const PairSettings& settings)>;
+/// Shared by the image and its stages.
+using Run = std::function<MixedDenoising(const Samples& samples, const MethodSettings& settings)>;
 
 /// denoise_by_mixture(), with the frame's guides applied to the history and kept for the next frame.
 MixedDenoising denoise_frame(DenoisingParts parts, const std::vector<CandidateMaker>& makers,
-                             const MixedDenoisingOptions& options, const PairSettings& settings,
+                             const MixedDenoisingOptions& options, const MethodSettings& settings,
                              std::span<const Layer> layers) {
   const Image *const albedo = settings.guides.albedo, *const normal = settings.guides.normal;
   const bool has_guides = albedo && normal;
@@ -202,12 +201,13 @@ MixedDenoising denoise_frame(DenoisingParts parts, const std::vector<CandidateMa
   return out;
 }
 
-Run run_of_pair(const Estimator& base, const MixedDenoisingOptions& options, bool with_oidn) {
-  return [=](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
+Run run_of_pair(const Method& base, const MixedDenoisingOptions& options, bool with_oidn) {
+  return [=](const Samples& samples, const MethodSettings& settings) {
     check_guides(settings.guides);
+    const auto& [crn, independent] = samples;
     if (std::min(crn.groups, independent.groups) < 2 * base.fewest_groups) {
       MixedDenoising out;
-      out.result = base.apply(crn, independent, settings);
+      out.result = base.image(samples, settings);
       out.result.note =
           fmt::format("with fewer than {} groups denoised images cannot be judged: the picture is that of {} alone",
                       2 * base.fewest_groups, base.text);
@@ -231,7 +231,8 @@ FilterKinds kinds_for(double samples, bool with_network, const MixingHistory& hi
 }
 
 Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
-  return [=](const GroupedImage&, const GroupedImage& independent, const PairSettings& settings) {
+  return [=](const Samples& samples, const MethodSettings& settings) {
+    const GroupedImage& independent = samples.independent;
     check_guides(settings.guides);
     std::vector<CandidateMaker> makers;
     if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn, CandidateBase::kMean));
@@ -246,7 +247,7 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
 RowsMethod rows_of_mean(const MixedDenoisingOptions& options) {
   RowsMethod method;
   method.reach_of_parts = kMeanReach;
-  method.parts = [](const PairInRows::Rows& rows, const PairSettings& settings) {
+  method.parts = [](const Samples& rows, const MethodSettings& settings) {
     DenoisingParts parts = parts_of_mean(rows.independent);
     parts.guides = settings.guides;
     return parts;
@@ -255,18 +256,18 @@ RowsMethod rows_of_mean(const MixedDenoisingOptions& options) {
     const FilterKinds kinds = kinds_for(samples, options.use_oidn, {});
     return filtered_candidates(guides, CandidateBase::kMean, kinds, first_row);
   };
-  method.are_enough = [](const PairInRows::Rows& rows) { return can_be_mixed(rows.independent); };
-  method.of_few = [](const PairInRows::Rows& rows, const PairSettings&, const std::vector<CandidateMaker>& makers) {
+  method.are_enough = [](const Samples& rows) { return can_be_mixed(rows.independent); };
+  method.of_few = [](const Samples& rows, const MethodSettings&, const std::vector<CandidateMaker>& makers) {
     return single_candidate(rows.independent, makers, {}).result;
   };
   return method;
 }
 
-RowsMethod rows_of_pair(const Estimator& base) {
+RowsMethod rows_of_pair(const Method& base) {
   RowsMethod method;
   method.base = CandidateBase::kPair;
   method.reach_of_parts = base.reach + kFilledReach;
-  method.parts = [base](const PairInRows::Rows& rows, const PairSettings& settings) {
+  method.parts = [base](const Samples& rows, const MethodSettings& settings) {
     DenoisingParts parts = parts_of_pair(base, rows.crn, rows.independent, settings);
     parts.guides = settings.guides;
     return parts;
@@ -274,71 +275,60 @@ RowsMethod rows_of_pair(const Estimator& base) {
   method.filters = [](const Guides& guides, int first_row, double) {
     return filtered_candidates(guides, CandidateBase::kPair, FilterKinds::kNlMeans, first_row);
   };
-  method.are_enough = [n = 2 * base.fewest_groups](const PairInRows::Rows& rows) {
+  method.are_enough = [n = 2 * base.fewest_groups](const Samples& rows) {
     return std::min(rows.crn.groups, rows.independent.groups) >= n;
   };
-  method.of_few = [run = run_of_pair(base, {}, false)](const PairInRows::Rows& rows, const PairSettings& settings,
+  method.of_few = [run = run_of_pair(base, {}, false)](const Samples& rows, const MethodSettings& settings,
                                                        const std::vector<CandidateMaker>&) {
-    return run(rows.crn, rows.independent, settings).result;
+    return run(rows, settings).result;
   };
   return method;
 }
 
-/// Lets the estimator work on rows of images that are too large for memory.
-void allow_rows(const Estimator& base, const MixedDenoisingOptions& options, bool with_oidn, Estimator& estimator) {
-  estimator.reach = -1;
+/// Lets the method work on rows of images that are too large for memory.
+void allow_rows(const Method& base, const MixedDenoisingOptions& options, bool with_oidn, Method& method) {
+  method.reach = -1;
   if (base.reach < 0 || options.history.before || options.history.keep_samples) return;
   MixedDenoisingOptions used = options;
   used.use_oidn = with_oidn;
-  RowsMethod method = is_mean(base) ? rows_of_mean(used) : rows_of_pair(base);
-  method.weighting = settings_of(options.mode).weighting;
-  if (with_oidn) method.network = options.oidn;
-  estimator.reach = rows_reach(method);
-  estimator.memory.of_whole = bytes_of_whole(with_oidn);
-  estimator.apply_in_rows = [method](const PairInRows& image, const PairSettings& settings) {
+  RowsMethod rows = base.is_mean() ? rows_of_mean(used) : rows_of_pair(base);
+  rows.weighting = settings_of(options.mode).weighting;
+  if (with_oidn) rows.network = options.oidn;
+  method.reach = rows_reach(rows);
+  method.memory.of_whole = bytes_of_whole(with_oidn);
+  method.image_in_rows = [rows](const SamplesInRows& image, const MethodSettings& settings) {
     check_guides(settings.guides);
-    return denoise_in_rows(image, settings, method);
+    return denoise_in_rows(image, settings, rows);
   };
 }
 
 }  // namespace
 
-bool can_be_denoised(const Estimator& estimator) {
-  return ((estimator.apply && !estimator.adaptive) || is_mean(estimator)) && estimator.predicts_error;
+bool can_be_denoised(const Method& method) {
+  return ((method.pair() && !method.adaptive) || method.is_mean()) && method.predicts_error;
 }
 
-Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& options) {
-  const auto named = [&](const char* name) {
-    Estimator estimator = base;
-    if (is_mean(base)) estimator.text.replace(0, base.name.size(), name), estimator.name = name;
-    return estimator;
-  };
-  if (options.mode == DenoiseMode::kNone) return named(kMeanName);
-  if (!can_be_denoised(base))
-    throw Error(ErrorCode::kUsage, "denoising needs an estimator that predicts its error, not " + base.name);
-  const bool with_oidn = options.use_oidn && (!options.oidn.library.empty() || !find_denoiser(options.oidn).empty());
-  Estimator estimator = named(kMixture);
-  if (with_oidn) estimator.network = "Open Image Denoise " + denoiser_info(options.oidn).version;  // or throws
-  estimator.text += fmt::format(" --denoise {}{}", settings_of(options.mode).name, with_oidn ? "" : " --oidn off");
-  estimator.fewest_groups = 2 * base.fewest_groups;
-  estimator.reads_guides = true;
-  allow_rows(base, options, with_oidn, estimator);
-  estimator.explain = nullptr;
-  estimator.memory.always += with_oidn ? kBytesWithOidn : kBytesPerPixel + (is_mean(base) ? kBytesOfMean : 0);
-  estimator.memory.of_halves = estimator.memory.of_halves_per_group = 0;  // part of that
-  if (is_mean(base)) estimator.passes = EstimatorPasses::kIndependent, estimator.fewest_groups = 1;
-  estimator.splits_layers = is_mean(base) && !base.adaptive;
-  if (AdaptiveSampling* adaptive = estimator.adaptive ? &*estimator.adaptive : nullptr) {
-    estimator.memory.of_halves_per_group = 3 * sizeof(float);  // both passes in one film
-    adaptive->counts.tops_up = true;
-    adaptive->counts.allocation = Allocation::kDenoised;
-  }
-  const Run run = is_mean(base) ? run_of_mean(options, with_oidn) : run_of_pair(base, options, with_oidn);
-  estimator.apply = [run](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
-    return run(crn, independent, settings).result;
-  };
-  estimator.stages = [run](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
-    MixedDenoising all = run(crn, independent, settings);
+namespace {
+
+/// The base's text under another name.
+std::string text_as(const char* name, const Method& base) { return name + base.text.substr(base.name.size()); }
+
+/// The passes of the base, of which `run` makes the mixture.
+void set_image(const Method& base, const Run& run, Method& method) {
+  if (base.is_mean())
+    method.passes = OnePass{.image = [run](const GroupedImage& independent, const MethodSettings& settings) {
+      return run({{}, independent}, settings).result;
+    }};
+  else
+    method.passes =
+        PassPair{.image =
+                     [run](const GroupedImage& crn, const GroupedImage& independent, const MethodSettings& settings) {
+                       return run({crn, independent}, settings).result;
+                     },
+                 .needs_sample_count = base.pair()->needs_sample_count,
+                 .explain = {}};
+  method.stages = [run](const Samples& samples, const MethodSettings& settings) {
+    MixedDenoising all = run(samples, settings);
     std::map<std::string, Image> stages;
     for (size_t p = 0; p < all.names.size(); ++p) {
       stages["candidate-" + all.names[p]] = std::move(all.candidates[p]);
@@ -346,11 +336,45 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
     }
     return stages;
   };
-  return estimator;
 }
 
-Estimator make_mixture(Settings& options) {
-  Estimator mean = make_none(options);
+}  // namespace
+
+Method with_denoising(const Method& base, const MixedDenoisingOptions& options) {
+  Method method;
+  if (options.mode == DenoiseMode::kNone) {
+    method = base;
+    if (base.is_mean()) method.text = text_as(kMeanName, base), method.name = kMeanName;
+    return method;
+  }
+  if (!can_be_denoised(base))
+    throw Error(ErrorCode::kUsage, "denoising needs an estimator that predicts its error, not " + base.name);
+  const bool with_oidn = options.use_oidn && (!options.oidn.library.empty() || !find_denoiser(options.oidn).empty());
+  method.name = base.is_mean() ? kMixture : base.name;
+  method.summary = base.summary;
+  method.text = (base.is_mean() ? text_as(kMixture, base) : base.text) +
+                fmt::format(" --denoise {}{}", settings_of(options.mode).name, with_oidn ? "" : " --oidn off");
+  if (with_oidn) method.network = "Open Image Denoise " + denoiser_info(options.oidn).version;  // or throws
+  method.fewest_groups = base.is_mean() ? 1 : 2 * base.fewest_groups;
+  method.predicts_error = method.reads_guides = true;
+  method.reliable_samples = base.reliable_samples;
+  method.memory = base.memory;
+  method.memory.always += with_oidn ? kBytesWithOidn : kBytesPerPixel + (base.is_mean() ? kBytesOfMean : 0);
+  method.memory.of_halves = method.memory.of_halves_per_group = 0;  // part of that
+  if (base.adaptive) {
+    method.adaptive = base.adaptive;
+    method.adaptive->counts.tops_up = true;
+    method.adaptive->counts.allocation = Allocation::kDenoised;
+    method.memory.of_halves_per_group = 3 * sizeof(float);  // both passes in one film
+  }
+  allow_rows(base, options, with_oidn, method);
+  set_image(base, base.is_mean() ? run_of_mean(options, with_oidn) : run_of_pair(base, options, with_oidn), method);
+  return method;
+}
+
+Method make_mixture(Settings& options) {
+  Method mean = make_none(options);
+  mean.name = mean.text = kMixture;
   mean.summary = "the mean, with denoised images mixed in";
   return mean;
 }

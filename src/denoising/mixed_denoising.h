@@ -20,7 +20,7 @@
 #include "denoising/candidates.h"
 #include "denoising/denoising_parts.h"
 #include "denoising/history.h"
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 #include "settings/settings.h"
 
 namespace covary {
@@ -47,18 +47,18 @@ struct MixedDenoisingOptions {
   MixingHistory history;
 };
 
-/// Denoises the estimator's image. `base` is a two-pass estimator that predicts its error, or the mean. For the former,
-/// the result needs twice its groups. For the mean, it takes a single pass (EstimatorPasses::kIndependent): a mixture
-/// from kFewestMixedSamples samples on, and the best single candidate with fewer. Reads guides and needs the whole
-/// image. Throws Error(kUsage) for any other base.
-Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& options);
+/// A method that holds another, whose image it denoises: that of a pair that predicts its error, or the mean. For the
+/// former, it needs twice the groups. For the mean, it takes one independent pass: a mixture from kFewestMixedSamples
+/// samples on, and the best single candidate with fewer. Throws Error(kUsage) for any other base.
+Method with_denoising(const Method& base, const MixedDenoisingOptions& options);
 
-/// Whether with_denoising() takes the estimator as base.
-bool can_be_denoised(const Estimator& estimator);
+/// Whether with_denoising() takes the method as base.
+bool can_be_denoised(const Method& method);
 
-/// The estimator kMixture of estimators/mean.h, before it is denoised, with these options. Throws Error(kUsage) listing
-/// everything wrong with them.
-Estimator make_mixture(Settings& options);
+/// The mean with denoised images mixed in: covary's default.
+inline constexpr const char* kMixture = "mixture";
+/// What it denoises, with these options. Throws Error(kUsage) listing everything wrong with them.
+Method make_mixture(Settings& options);
 
 /// MixedDenoisingOptions as text, as on the command line.
 struct DenoisingChoice {
@@ -78,7 +78,7 @@ std::string missing_network(const DenoisingChoice& choice);
 
 /// Result of denoise_by_mixture().
 struct MixedDenoising {
-  EstimatorResult result;
+  MethodImage result;
   std::vector<std::string> names;  ///< of the candidates
   std::vector<Image> candidates;   ///< made of all samples
   std::vector<Image> weights;      ///< one channel each
@@ -94,6 +94,8 @@ inline constexpr int kFewestMixedSamples = 4;
 
 /// The modes by name, "none" first.
 const std::vector<std::string>& denoise_mode_names();
+/// Whether it gives up error for less bias.
+bool lowers_bias(DenoiseMode mode);
 /// Throws Error(kUsage) for an unknown name.
 DenoiseMode denoise_mode(const std::string& name);
 

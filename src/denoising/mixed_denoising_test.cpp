@@ -37,22 +37,22 @@ struct Inputs {
   }
 };
 
-Estimator denoiser(DenoiseMode mode) {
+Method denoiser(DenoiseMode mode) {
   MixedDenoisingOptions options;
   options.mode = mode;
   options.use_oidn = false;
   return with_denoising(make_estimator("iicv"), options);
 }
 
-EstimatorResult denoised(const Inputs& in, DenoiseMode mode, const Guides& guides = {}) {
-  PairSettings settings;
+MethodImage denoised(const Inputs& in, DenoiseMode mode, const Guides& guides = {}) {
+  MethodSettings settings;
   settings.std_error = true;
   settings.guides = guides;
-  return denoiser(mode).apply(in.crn.view(), in.independent.view(), settings);
+  return denoiser(mode).image({in.crn.view(), in.independent.view()}, settings);
 }
 
 Image iicv_of(const Inputs& in) {
-  return make_estimator("iicv").apply(in.crn.view(), in.independent.view(), {}).estimate;
+  return make_estimator("iicv").image({in.crn.view(), in.independent.view()}, {}).estimate;
 }
 
 /// Mean of the samples relative to test::expected(): outliers add 5 times that to 1 % of them.
@@ -84,23 +84,23 @@ TEST(MixedDenoising, HasLessErrorThanItsEstimator) {
 
 TEST(MixedDenoising, IsTheEstimatorWithoutAMode) {
   const Inputs in(1);
-  const Estimator none = with_denoising(make_estimator("iicv"), {DenoiseMode::kNone});
-  EXPECT_EQ(none.apply(in.crn.view(), in.independent.view(), {}).estimate.data, iicv_of(in).data);
+  const Method none = with_denoising(make_estimator("iicv"), {DenoiseMode::kNone});
+  EXPECT_EQ(none.image({in.crn.view(), in.independent.view()}, {}).estimate.data, iicv_of(in).data);
   EXPECT_EQ(none.text, make_estimator("iicv").text);
 }
 
-Estimator mean_denoiser(DenoiseMode mode) {
+Method mean_denoiser(DenoiseMode mode) {
   MixedDenoisingOptions options;
   options.mode = mode;
   options.use_oidn = false;
   return with_denoising(make_estimator("none"), options);
 }
 
-EstimatorResult denoised_mean(const test::Grouped& image, DenoiseMode mode, const Guides& guides = {}) {
-  PairSettings settings;
+MethodImage denoised_mean(const test::Grouped& image, DenoiseMode mode, const Guides& guides = {}) {
+  MethodSettings settings;
   settings.std_error = true;
   settings.guides = guides;
-  return mean_denoiser(mode).apply({}, image.view(), settings);
+  return mean_denoiser(mode).image({{}, image.view()}, settings);
 }
 
 double mean_square(const Image& image) {
@@ -112,14 +112,14 @@ double mean_square(const Image& image) {
 // Both halves chose the weights, so their images depend on each other's samples and the predicted error is too small
 // where noise is strong; the fit of error_interval.h accounts for that.
 TEST(MixedDenoising, OfASinglePassTellsItsErrorByItsSamples) {
-  const EstimatorResult result = denoised_mean(Inputs(1).independent, DenoiseMode::kAuto);
+  const MethodImage result = denoised_mean(Inputs(1).independent, DenoiseMode::kAuto);
   EXPECT_EQ(result.risk_kind, ErrorKind::kFilters);
   const RiskRow sums = sum_of(result.risk_rows);
   EXPECT_EQ(sums.values, 3.0 * kWidth * kHeight);
   EXPECT_EQ(sums.groups, 12);
   EXPECT_LT(sums.variance, 0.2 * sums.noise) << "it has less noise than the mean";
   EXPECT_LT(std::abs(sums.error), 0.5 * sums.noise);
-  const EstimatorResult of_pair = denoised(Inputs(1), DenoiseMode::kError);
+  const MethodImage of_pair = denoised(Inputs(1), DenoiseMode::kError);
   EXPECT_EQ(of_pair.risk_kind, ErrorKind::kPairFilters);
   EXPECT_EQ(of_pair.risk_rows.size(), static_cast<size_t>(kHeight));
 }
@@ -129,8 +129,8 @@ TEST(MixedDenoising, TellsHowMuchNoiseIsBehindGlass) {
   std::fill(pane.data.begin(), pane.data.end(), 1.0f);
   std::fill(behind.data.begin(), behind.data.end(), 0.5f);
   const Inputs in(1);
-  for (const EstimatorResult& result : {denoised_mean(in.independent, DenoiseMode::kAuto, {&pane, nullptr, &behind}),
-                                        denoised(in, DenoiseMode::kError, {&pane, nullptr, &behind})}) {
+  for (const MethodImage& result : {denoised_mean(in.independent, DenoiseMode::kAuto, {&pane, nullptr, &behind}),
+                                    denoised(in, DenoiseMode::kError, {&pane, nullptr, &behind})}) {
     const RiskRow sums = sum_of(result.risk_rows);
     EXPECT_EQ(sums.specular_noise, sums.noise);
   }
@@ -141,13 +141,13 @@ TEST(MixedDenoising, OfManySamplesMixesNlMeansBesideTheRegression) {
   const Inputs in(1);
   Image albedo(kWidth, kHeight, 3);
   std::fill(albedo.data.begin(), albedo.data.end(), 0.5f);
-  PairSettings settings;
+  MethodSettings settings;
   settings.guides.albedo = &albedo;
   std::vector<uint32_t> counts(static_cast<size_t>(kWidth) * kHeight, 63);
   GroupedImage image = in.independent.view();
   image.counts = counts.data();
   const auto has_sharp = [&] {
-    const std::map<std::string, Image> stages = mean_denoiser(DenoiseMode::kAuto).stages({}, image, settings);
+    const std::map<std::string, Image> stages = mean_denoiser(DenoiseMode::kAuto).stages({{}, image}, settings);
     EXPECT_TRUE(stages.contains("candidate-regression"));
     return stages.contains("candidate-sharp");
   };
@@ -158,8 +158,9 @@ TEST(MixedDenoising, OfManySamplesMixesNlMeansBesideTheRegression) {
 
 TEST(MixedDenoising, OfASinglePassHasLessErrorThanItsMean) {
   const Inputs in(1);
-  const Estimator estimator = mean_denoiser(DenoiseMode::kError);
-  EXPECT_EQ(estimator.passes, EstimatorPasses::kIndependent);
+  const Method estimator = mean_denoiser(DenoiseMode::kError);
+  EXPECT_TRUE(estimator.one_pass());
+  EXPECT_FALSE(estimator.is_mean());
   EXPECT_EQ(estimator.text, "mixture --denoise error --oidn off");
   const double before = square_error(mean_of_groups(in.independent.view()).estimate);
   EXPECT_LT(square_error(denoised_mean(in.independent, DenoiseMode::kBias).estimate), 0.75 * before);
@@ -173,17 +174,17 @@ TEST(MixedDenoising, OfASinglePassHasLessErrorThanItsMean) {
 TEST(MixedDenoising, TellsItsBiasAndTheErrorsOfItsParts) {
   const Inputs in(1);
   const test::Grouped& image = in.independent;
-  PairSettings settings;
+  MethodSettings settings;
   settings.std_error = true;
-  const Estimator estimator = mean_denoiser(DenoiseMode::kAuto);
-  const EstimatorResult result = estimator.apply({}, image.view(), settings);
+  const Method estimator = mean_denoiser(DenoiseMode::kAuto);
+  const EstimatorResult result = estimator.image({{}, image.view()}, settings);
   ASSERT_TRUE(result.risks);
   ASSERT_GE(result.risks->images.size(), 3u);
   EXPECT_EQ(result.risks->images[0].name, "mean");
   EXPECT_EQ(result.risks->images[1].name, "sharp");
   EXPECT_GE(result.risks->bias_share, 0);
   EXPECT_LT(result.risks->bias_share, 1);
-  std::map<std::string, Image> stages = estimator.stages({}, image.view(), settings);
+  std::map<std::string, Image> stages = estimator.stages({{}, image.view()}, settings);
   stages["candidate-mean"] = mean_of_groups(image.view()).estimate;
   const Image exact = truth();
   for (const auto& [name, relmse] : result.risks->images) {
@@ -199,7 +200,7 @@ TEST(MixedDenoising, TellsItsBiasAndTheErrorsOfItsParts) {
   }
   EXPECT_EQ(denoised(in, DenoiseMode::kAuto).risks->images[0].name, "iicv");
   settings.std_error = false;
-  EXPECT_FALSE(estimator.apply({}, image.view(), settings).risks);
+  EXPECT_FALSE(estimator.image({{}, image.view()}, settings).risks);
 }
 
 TEST(MixedDenoising, OfASinglePassTakesTwoGroupsOfManySamples) {
@@ -217,9 +218,9 @@ TEST(MixedDenoising, OfASinglePassSaysWhenSamplesAreTooFewToJudge) {
     const std::vector<uint32_t> counts(static_cast<size_t>(kWidth) * kHeight, samples);
     GroupedImage image = in.independent.view();
     image.counts = counts.data();
-    PairSettings settings;
+    MethodSettings settings;
     settings.std_error = true;
-    const EstimatorResult result = mean_denoiser(DenoiseMode::kError).apply({}, image, settings);
+    const EstimatorResult result = mean_denoiser(DenoiseMode::kError).image({{}, image}, settings);
     const bool is_few = samples < 4;
     EXPECT_EQ(result.note.find("fewer than 4 samples per pixel") != std::string::npos, is_few) << samples;
     EXPECT_EQ(result.std_error.data.empty(), is_few) << samples;
@@ -425,7 +426,7 @@ TEST(MixedDenoising, SaysWhatItCannotDo) {
   elsewhere.oidn.library = "/nowhere/libOpenImageDenoise.so.2";
   const Inputs in(9);
   EXPECT_NE(message_of([&] {
-              with_denoising(make_estimator("iicv"), elsewhere).apply(in.crn.view(), in.independent.view(), {});
+              with_denoising(make_estimator("iicv"), elsewhere).image({in.crn.view(), in.independent.view()}, {});
             }).find("Open Image Denoise was not found (/nowhere/"),
             std::string::npos);
   EXPECT_EQ(denoiser(DenoiseMode::kError).fewest_groups, 6);

@@ -111,7 +111,7 @@ void append(const MixedRows& part, int skipped, int y, int n, int height, MixedR
     append_to(part.of_candidates[p], skipped, n, whole.of_candidates[p]);
 }
 
-EstimatorResult finish(MixedRows whole, const std::vector<CandidateMaker>& makers, const std::string& base) {
+MethodImage finish(MixedRows whole, const std::vector<CandidateMaker>& makers, const std::string& base) {
   if (whole.of_base.empty()) return std::move(whole.result);
   const std::vector<HeldOutRow> rows = whole.error.rows;
   whole.result.std_error = held_out_error(std::move(whole.error), whole.disagreement, usual_error(makers));

@@ -14,7 +14,7 @@ namespace covary {
 
 struct MixedRows {
   /// Estimate; with an error: bias and risk_rows, and after finish() std_error and risks.
-  EstimatorResult result;
+  MethodImage result;
   // Only with an error:
   HeldOutParts error;
   Image disagreement;                                  ///< of held_out_error()
@@ -37,7 +37,7 @@ MixedRows mixed_rows(const DenoisingParts& parts, const MixedParts& mixed, const
 void append(const MixedRows& part, int skipped, int y, int n, int height, MixedRows& whole);
 
 /// The result of all rows. `base`: the name of the image that the candidates are mixed with.
-EstimatorResult finish(MixedRows whole, const std::vector<CandidateMaker>& makers, const std::string& base);
+MethodImage finish(MixedRows whole, const std::vector<CandidateMaker>& makers, const std::string& base);
 
 /// The names of the candidates, in their order.
 std::vector<std::string> names_of(const std::vector<CandidateMaker>& makers);

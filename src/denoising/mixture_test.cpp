@@ -274,50 +274,5 @@ TEST(HeldOutError, IsWhereImagesDisagreeAndAsLargeInAll) {
   EXPECT_NEAR(ends[1] / ends[0], 16, 2);
 }
 
-/// A result with `n` rows of held-out error, each `error` plus or minus `spread`.
-EstimatorResult with_rows(double error, double variance, double predicted, double spread, int n) {
-  EstimatorResult result;
-  result.std_error = Image(1, 1, 3);
-  std::fill(result.std_error.data.begin(), result.std_error.data.end(), 1.0f);
-  for (int i = 0; i < n; ++i) {
-    const double value = error + (i % 2 ? spread : -spread);
-    result.held_out.push_back({value, variance, predicted, value * value, 1});
-  }
-  return result;
-}
-
-double calibrated(EstimatorResult result) {
-  calibrate(result);
-  EXPECT_TRUE(result.held_out.empty());
-  return std::pow(result.std_error.data[0], 2);
-}
-
-TEST(Calibration, TrustsHeldOutSamplesAsFarAsTheyKnow) {
-  // Without noise: a squared bias of 1 and a half's variance of 2 give an error of 2 for the whole.
-  EXPECT_NEAR(calibrated(with_rows(3, 2, 1, 0, 100)), 2, 1e-5);
-  EXPECT_NEAR(calibrated(with_rows(3, 2, 4, 0, 100)), 0.5, 1e-5);
-  // A relative standard error of 0.3: halfway, in logarithms.
-  EXPECT_NEAR(calibrated(with_rows(3, 2, 8, 0.3 * 3 * 10, 100)), 0.5, 1e-3);
-  // Only noise, or no data: the estimator's own prediction.
-  EXPECT_NEAR(calibrated(with_rows(3, 2, 8, 1e4, 100)), 1, 0.01);
-  EXPECT_EQ(calibrated(with_rows(-1, 2, 8, 0, 100)), 1);
-  EXPECT_EQ(calibrated(with_rows(3, 2, 8, 0, 0)), 1);
-}
-
-TEST(Calibration, SaysHowFarBothPredictionsAgree) {
-  EstimatorResult known = with_rows(3, 2, 1, 0.3 * 3 * 10, 100);
-  calibrate(known);
-  ASSERT_TRUE(known.verdict);
-  EXPECT_NEAR(known.verdict->uncertainty, 0.3, 1e-6);
-  EXPECT_NEAR(known.verdict->ratio, 2, 1e-6);
-  EstimatorResult unknown = with_rows(-1, 2, 8, 0, 100);
-  calibrate(unknown);
-  ASSERT_TRUE(unknown.verdict);
-  EXPECT_FALSE(std::isfinite(unknown.verdict->uncertainty));
-  EstimatorResult without;
-  calibrate(without);
-  EXPECT_FALSE(without.verdict);
-}
-
 }  // namespace
 }  // namespace covary::mixture_test

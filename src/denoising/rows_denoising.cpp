@@ -39,17 +39,17 @@ struct GuideRows {
 /// Rows first … of the image, which hold the rows that are wanted from row `skipped` on.
 struct Band {
   int first = 0, skipped = 0;
-  PairInRows::Rows rows;
+  Samples rows;
   GuideRows guides;
-  PairSettings settings;
+  MethodSettings settings;
 };
 
 class RowsDenoising {
  public:
-  RowsDenoising(const PairInRows& image, const PairSettings& settings, const RowsMethod& method)
+  RowsDenoising(const SamplesInRows& image, const MethodSettings& settings, const RowsMethod& method)
       : image_(image), settings_(settings), method_(method) {}
 
-  EstimatorResult run() {
+  MethodImage run() {
     survey();
     const bool is_mean = method_.base == CandidateBase::kMean;
     if (method_.network && (enough_ || is_mean)) denoise_by_network();
@@ -66,7 +66,7 @@ class RowsDenoising {
       append(mixed_rows(parts, mixed, makers, settings_.std_error), band.skipped, y, n, image_.height, whole);
       whole.result.nonfinite_pixels += unusable(band, n);
     });
-    EstimatorResult result = finish(std::move(whole), makers, base);
+    MethodImage result = finish(std::move(whole), makers, base);
     result.network_runs = network_ ? network_->runs : 0;
     return result;
   }
@@ -89,7 +89,7 @@ class RowsDenoising {
 
   /// The number of samples, and whether there are enough.
   void survey() {
-    const PairInRows::Rows first = image_.rows(0, 1);
+    const Samples first = image_.rows(0, 1);
     enough_ = method_.are_enough(first), whole_.samples = mean_samples(first.independent);
     if (!first.independent.counts) return;  // all pixels are alike
     double samples = 0;
@@ -154,10 +154,10 @@ class RowsDenoising {
     whole_.everywhere = weights_of_whole(is_mean, makers, method_.weighting, whole_.samples, all);
   }
 
-  EstimatorResult by_bands_of_few() const {
-    EstimatorResult whole;
+  MethodImage by_bands_of_few() const {
+    MethodImage whole;
     for_each_band(method_.reach_of_parts + kCandidateReach, 0, image_.height, [&](const Band& band, int y, int n) {
-      const EstimatorResult part = method_.of_few(band.rows, band.settings, makers_of(band));
+      const MethodImage part = method_.of_few(band.rows, band.settings, makers_of(band));
       append_rows(part, band.skipped, y, n, image_.height, whole);
       whole.note = part.note;
       whole.nonfinite_pixels += unusable(band, n);
@@ -174,8 +174,8 @@ class RowsDenoising {
     return n_unusable;
   }
 
-  const PairInRows& image_;
-  const PairSettings& settings_;
+  const SamplesInRows& image_;
+  const MethodSettings& settings_;
   const RowsMethod& method_;
   WholeImage whole_;
   bool enough_ = true;
@@ -196,7 +196,7 @@ double bytes_of_whole(bool with_network) {
   return with_network ? (3 + 5 - 3) * kImage : 2 * kPlane;
 }
 
-EstimatorResult denoise_in_rows(const PairInRows& image, const PairSettings& settings, const RowsMethod& method) {
+MethodImage denoise_in_rows(const SamplesInRows& image, const MethodSettings& settings, const RowsMethod& method) {
   return RowsDenoising(image, settings, method).run();
 }
 

@@ -21,16 +21,16 @@ struct RowsMethod {
   PartsWeighting weighting;
   CandidateBase base = CandidateBase::kMean;
   int reach_of_parts = 0;  ///< radius of influence of the images on the parts
-  std::function<DenoisingParts(const PairInRows::Rows& rows, const PairSettings& settings)> parts;
+  std::function<DenoisingParts(const Samples& rows, const MethodSettings& settings)> parts;
   /// `samples`: mean_samples() of the image.
   std::function<CandidateMaker(const Guides& guides, int first_row, double samples)> filters;
   std::optional<DenoiseOptions> network;
   /// The image of rows whose samples are too few for a mixture.
-  std::function<EstimatorResult(const PairInRows::Rows& rows, const PairSettings& settings,
-                                const std::vector<CandidateMaker>& makers)>
+  std::function<MethodImage(const Samples& rows, const MethodSettings& settings,
+                            const std::vector<CandidateMaker>& makers)>
       of_few;
   /// Whether the rows have enough samples for a mixture.
-  std::function<bool(const PairInRows::Rows& rows)> are_enough;
+  std::function<bool(const Samples& rows)> are_enough;
 };
 
 /// Radius of influence of the image on a pixel, in rows.
@@ -40,6 +40,6 @@ int rows_reach(const RowsMethod& method);
 double bytes_of_whole(bool with_network);
 
 /// Throws like the estimator.
-EstimatorResult denoise_in_rows(const PairInRows& image, const PairSettings& settings, const RowsMethod& method);
+MethodImage denoise_in_rows(const SamplesInRows& image, const MethodSettings& settings, const RowsMethod& method);
 
 }  // namespace covary

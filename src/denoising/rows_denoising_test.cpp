@@ -39,15 +39,15 @@ struct Scene {
       independent.pixel(9, y)[4] = std::numeric_limits<float>::quiet_NaN();
   }
 
-  PairSettings settings(bool with_guides) const {
-    PairSettings settings;
+  MethodSettings settings(bool with_guides) const {
+    MethodSettings settings;
     settings.std_error = true;
     if (with_guides) settings.guides = {&albedo, &normal, nullptr, nullptr, &position};
     return settings;
   }
 };
 
-void expect_equal(const EstimatorResult& rows, const EstimatorResult& whole, const std::string& what) {
+void expect_equal(const MethodImage& rows, const MethodImage& whole, const std::string& what) {
   EXPECT_EQ(rows.estimate.data, whole.estimate.data) << what;
   EXPECT_EQ(rows.std_error.data, whole.std_error.data) << what;
   EXPECT_EQ(rows.bias.data, whole.bias.data) << what;
@@ -69,24 +69,24 @@ void expect_equal(const EstimatorResult& rows, const EstimatorResult& whole, con
 }
 
 /// `spare`: rows of a band beside those around it.
-void check(const Estimator& estimator, const Scene& scene, bool with_guides, int spare, const std::string& what) {
-  const bool is_pair = estimator.passes == EstimatorPasses::kPair;
+void check(const Method& estimator, const Scene& scene, bool with_guides, int spare, const std::string& what) {
+  const bool is_pair = estimator.pair();
   const GroupedImage crn = is_pair ? scene.crn.view() : GroupedImage(), independent = scene.independent.view();
-  const PairSettings settings = scene.settings(with_guides);
-  ASSERT_TRUE(estimator.apply_in_rows) << what;
+  const MethodSettings settings = scene.settings(with_guides);
+  ASSERT_TRUE(estimator.image_in_rows) << what;
   ASSERT_GT(scene.height, 2 * estimator.reach + spare) << what << ": there is more than one band";
   int most = 0;
   const auto rows = [&](int first, int n) {
     most = std::max(most, n);
-    return PairInRows::Rows{is_pair ? rows_of(crn, first, n) : GroupedImage(), rows_of(independent, first, n)};
+    return Samples{is_pair ? rows_of(crn, first, n) : GroupedImage(), rows_of(independent, first, n)};
   };
   const int at_once = 2 * estimator.reach + spare;
-  expect_equal(estimator.apply_in_rows({kWidth, scene.height, at_once, rows}, settings),
-               estimator.apply(crn, independent, settings), what);
+  expect_equal(estimator.image_in_rows({kWidth, scene.height, at_once, rows}, settings),
+               estimator.image({crn, independent}, settings), what);
   EXPECT_LE(most, at_once) << what;
 }
 
-Estimator denoiser(const char* name, DenoiseMode mode, bool with_network = false) {
+Method denoiser(const char* name, DenoiseMode mode, bool with_network = false) {
   MixedDenoisingOptions options;
   options.mode = mode;
   options.use_oidn = with_network;
@@ -95,7 +95,7 @@ Estimator denoiser(const char* name, DenoiseMode mode, bool with_network = false
 
 TEST(RowsDenoising, OfAMeanHaveTheBitsOfTheWhole) {
   const Scene scene(331, 4);
-  const Estimator estimator = denoiser("none", DenoiseMode::kAuto);
+  const Method estimator = denoiser("none", DenoiseMode::kAuto);
   for (const int spare : {24, 60, 90}) {
     check(estimator, scene, false, spare, "without guides");
     check(estimator, scene, true, spare, "with guides");
@@ -131,7 +131,7 @@ TEST(RowsDenoising, WithTheNetworkHaveTheBitsOfTheWhole) {
     return;
   }
   const Scene scene(331, 4);
-  const Estimator of_mean = denoiser("none", DenoiseMode::kAuto, true);
+  const Method of_mean = denoiser("none", DenoiseMode::kAuto, true);
   check(of_mean, scene, true, 24, "a mean with guides");
   check(of_mean, scene, false, 60, "a mean without guides");
   check(denoiser("iicv", DenoiseMode::kAuto, true), Scene(601, 6), true, 60, "a pair");

@@ -10,7 +10,7 @@
 
 #include "dependent_tests/least_error_mixture.h"
 #include "estimators/control_variates.h"
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 
 namespace covary {
 namespace {
@@ -175,7 +175,7 @@ EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& ind
   COVARY_CHECK(in_range(options), "options of dependent-tests are in the ranges that dependent_tests.h states");
   std::vector<std::string> problems;
   check(crn, independent, problems);
-  throw_if_any("dependent-tests", problems);
+  throw_if_any(kDependentTests, problems);
 
   const int width = crn.width, height = crn.height, reach = dependent_tests_reach(options);
   const int step = rows_of_band(width, reach);
@@ -227,7 +227,7 @@ void declare(Settings& p, DependentTestsOptions& o) {
 
 }  // namespace
 
-Estimator make_dependent_tests(Settings& p) {
+Method make_dependent_tests(Settings& p) {
   const bool paper = p.flag("paper", "dependent-tests as published: its filter, weights and allocation",
                             {.effect = OptionEffect::kPasses});
   DependentTestsOptions o = paper ? DependentTestsOptions::paper() : DependentTestsOptions();
@@ -238,19 +238,19 @@ Estimator make_dependent_tests(Settings& p) {
   ask_for(p, adaptive);
   declare(p, o);
 
-  Estimator estimator;
+  Method estimator;
   estimator.summary = "dependent tests driven filtering";
   estimator.fewest_groups = 2;
   estimator.adaptive = adaptive;
   estimator.reach = dependent_tests_reach(o);
   estimator.memory.always = kDependentTestsBytesPerPixel;
   estimator.memory.largest_part = kDependentTestsBand;
-  estimator.apply = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings&) {
-    return dependent_tests(crn, independent, o);
-  };
-  estimator.stages = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings&) {
+  estimator.passes = PassPair{.image = [o](const GroupedImage& crn, const GroupedImage& independent,
+                                           const MethodSettings&) { return dependent_tests(crn, independent, o); },
+                              .explain = {}};
+  estimator.stages = [o](const Samples& samples, const MethodSettings&) {
     DependentTestsStages stages;
-    dependent_tests(crn, independent, o, &stages);
+    dependent_tests(samples.crn, samples.independent, o, &stages);
     return stages;
   };
   return estimator;

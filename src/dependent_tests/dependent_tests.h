@@ -27,7 +27,7 @@
 namespace covary {
 
 class Settings;
-struct Estimator;
+struct Method;
 
 enum class DependentFilter {
   kPaper,  ///< region_filter.h
@@ -79,7 +79,8 @@ inline constexpr double kDependentTestsBytesPerPixel = 4.0 * (3 + 3 + 2 + 2 + 7 
 /// beyond input and result, unless 64 rows and their surroundings need more.
 inline constexpr double kDependentTestsBand = 48e6;
 
+inline constexpr const char* kDependentTests = "dependent-tests";
 /// The estimator `dependent-tests` with these options. Throws Error(kUsage) listing everything wrong with them.
-Estimator make_dependent_tests(Settings& options);
+Method make_dependent_tests(Settings& options);
 
 }  // namespace covary

@@ -96,7 +96,7 @@ inline constexpr const char* kVariatesHelp = "Number of control variates";
 inline constexpr OptionRange kWindowRange{.low = 3, .high = 63, .odd = true};
 inline constexpr const char* kWindowHelp = "Side of the neighbourhood window";
 
-/// Estimator::reliable_samples for Eq. (8) of [YM2025]. Measured on crops of three scenes, 8 to 192 samples per pixel,
+/// Method::reliable_samples for Eq. (8) of [YM2025]. Measured on crops of three scenes, 8 to 192 samples per pixel,
 /// 6 seeds (docs/notes/iicv.md): with fewer samples, IICV as published predicts 0.3 to 0.6 of its true squared error.
 inline constexpr uint32_t kReliableSamples = 48;
 

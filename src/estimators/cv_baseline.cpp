@@ -6,7 +6,7 @@
 
 #include "core/error.h"
 #include "estimators/control_variates.h"
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 #include "estimators/missing_light.h"
 
 namespace covary {
@@ -36,7 +36,7 @@ EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& indepen
   return result;
 }
 
-Estimator make_cv_baseline(Settings& parameters) {
+Method make_cv_baseline(Settings& parameters) {
   Settings& p = parameters;
   CvBaselineOptions o;
   p.whole("k", o.k, kVariatesRange, kVariatesHelp);
@@ -44,21 +44,23 @@ Estimator make_cv_baseline(Settings& parameters) {
   p.real("ridge", o.ridge, {.low = 0}, "Ridge relative to the mean diagonal");
   std::vector<std::string> problems;
   check_k(o.k, o.window, problems);
-  throw_if_any("cv-baseline", problems);
+  throw_if_any(kCvBaseline, problems);
 
-  Estimator estimator;
+  PassPair pair;
+  pair.image = [o](const GroupedImage& crn, const GroupedImage& independent, const MethodSettings& settings) {
+    CvBaselineOptions options = o;
+    options.std_error = settings.std_error;
+    return cv_baseline(crn, independent, options);
+  };
+  pair.explain = explain_by_probe(cv_baseline, o);
+  Method estimator;
+  estimator.passes = pair;
   estimator.summary = "control variates that ignore the errors of the independent image";
   estimator.predicts_error = true;
   estimator.reliable_samples = kReliableSamples;
   estimator.fewest_groups = 3;
   estimator.reach = o.window / 2 + kMissingWindow / 2;
   estimator.memory.always = kCvBaselineBytesPerPixel;
-  estimator.apply = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
-    CvBaselineOptions options = o;
-    options.std_error = settings.std_error;
-    return cv_baseline(crn, independent, options);
-  };
-  estimator.explain = explain_by_probe(cv_baseline, o);
   return estimator;
 }
 

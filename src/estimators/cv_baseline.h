@@ -12,7 +12,7 @@
 namespace covary {
 
 class Settings;
-struct Estimator;
+struct Method;
 
 struct CvBaselineOptions {
   /// Number of control variates; default 25, 1 … number of pixels in the window ([YM2025] Sec. 5).
@@ -38,7 +38,8 @@ EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& indepen
 /// Approximate memory of cv_baseline() beyond its input, including its result: bytes per pixel.
 inline constexpr double kCvBaselineBytesPerPixel = (2 * 6 + 6 + 3 + 6) * sizeof(float) + 1;
 
+inline constexpr const char* kCvBaseline = "cv-baseline";
 /// The estimator `cv-baseline` with these options. Throws Error(kUsage) listing everything wrong with them.
-Estimator make_cv_baseline(Settings& options);
+Method make_cv_baseline(Settings& options);
 
 }  // namespace covary

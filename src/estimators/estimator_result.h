@@ -11,16 +11,6 @@
 
 namespace covary {
 
-/// What held-out samples reveal about the error of a row of pixels (risk/held_out_error.h), relative as in relMSE: sums
-/// over its values, each divided by F'^2 + 0.01.
-struct HeldOutRow {
-  double error = 0;      ///< squared error of images made from half of the samples
-  double variance = 0;   ///< its variance part
-  double predicted = 0;  ///< squared standard error of the image made from all samples
-  double squares = 0;    ///< sum of squared `error` of the `parts` segments of the row
-  int parts = 0;
-};
-
 /// What the samples reveal about the error of a row of the image (risk/image_risk.h), relative as in relMSE: sums over
 /// its values, each divided by G'^2 + 0.01.
 struct RiskRow {
@@ -37,7 +27,7 @@ struct RiskRow {
   /// (M - h)^2 - v where M is ten times as bright as h at the pixel and around it, over that brightness squared
   double spread = 0;
   double values = 0, parts = 0;
-  double predicted = 0;  ///< from the standard error, before apply_interval(), which sets it
+  double predicted = 0;  ///< from the standard error, which with_error() sets
   double groups = 0;     ///< number per pixel; not a sum
 };
 
@@ -71,12 +61,6 @@ struct ErrorInterval {
   std::string unknown;          ///< why no bounds can be given; empty if they are
 };
 
-/// What calibrate() of risk/held_out_error.h found about the predicted error.
-struct HeldOutVerdict {
-  double uncertainty = 0;  ///< relative standard error of the held-out error; infinite if that is not positive
-  double ratio = 1;        ///< squared error by held-out samples over that predicted by the estimator
-};
-
 /// Measured errors of a mixture of images and of each of its parts alone, as relMSE at all samples.
 struct MeasuredRisks {
   /// Of the mixture, by held-out samples alone: comparable for the same held-out samples. Noisy, so it may be negative.
@@ -89,14 +73,14 @@ struct MeasuredRisks {
   std::vector<OfImage> images;
 };
 
-/// Result of an estimator. `estimate` has the three channels R, G, B. So do `std_error` and `bias`, or they are empty:
+/// An image and its error. `estimate` has the three channels R, G, B. So do `std_error` and `bias`, or they are empty:
 /// the first if no error estimate was requested, the second if no bias is known.
 struct EstimatorResult {
   Image estimate;
   Image std_error;
   /// Bias of each value where it is significant, positive if too bright; zero elsewhere (risk/held_out_bias.h).
   Image bias;
-  /// Layers of the estimate that sum to it, in the order of PairSettings::layers; empty if there were none.
+  /// Layers of the estimate that sum to it, in the order of MethodSettings::layers; empty if there were none.
   std::vector<Image> layers;
   /// For animation frames: means of both halves of the samples of this and previous frames, for the next frame
   /// (denoising/history.h); empty if not requested.
@@ -104,16 +88,21 @@ struct EstimatorResult {
   /// Pixels with a value in either input that is not usable (filters/planes.h). They are ignored everywhere else, and
   /// set to the mean of their usable groups, or else of the pixels around.
   long nonfinite_pixels = 0;
-  /// One per row, for calibrate() of risk/held_out_error.h; empty if nothing was held out.
-  std::vector<HeldOutRow> held_out;
-  std::vector<RiskRow> risk_rows;  ///< one per row, for apply_interval(); empty if the error is unknown
-  ErrorKind risk_kind = ErrorKind::kFilters;
-  int network_runs = 0;                   ///< runs of Estimator::network: images and auxiliary images denoised
-  std::optional<RiskRow> risk_sums;       ///< over all rows, set by apply_interval()
-  std::optional<ErrorInterval> interval;  ///< of the predicted relMSE, set by apply_interval()
+  int network_runs = 0;                   ///< runs of Method::network: images and auxiliary images denoised
   std::string note;                       ///< a remark for the user on how the image was made; usually empty
   std::optional<MeasuredRisks> risks;     ///< of mixtures with a predicted error
-  std::optional<HeldOutVerdict> verdict;  ///< set by calibrate(); empty if nothing was held out
+  std::optional<RiskRow> risk_sums;       ///< over all rows, where samples tell the error (risk/error_interval.h)
+  std::optional<ErrorInterval> interval;  ///< of the predicted relMSE, likewise
+};
+
+/// What a method makes: an image whose error is not yet derived from what the samples tell of it, row by row.
+/// with_error() of risk/error_interval.h does that.
+struct MethodImage : EstimatorResult {
+  std::vector<RiskRow> risk_rows;  ///< one per row; empty if the samples tell nothing
+  ErrorKind risk_kind = ErrorKind::kFilters;
+
+  MethodImage() = default;
+  MethodImage(EstimatorResult result) : EstimatorResult(std::move(result)) {}
 };
 
 // Inspection of image-space control variates: what one pixel was computed from.

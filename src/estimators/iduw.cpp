@@ -8,7 +8,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "estimators/control_variates.h"
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 #include "filters/planes.h"
 
 namespace covary {
@@ -153,7 +153,7 @@ EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& independent, c
   if (options.samples < 1)
     problems.push_back(fmt::format("samples is {}, expected the samples per pixel of the CRN image", options.samples));
   check_inputs(crn, independent, 4, 4, problems);
-  throw_if_any("iduw", problems);
+  throw_if_any(kIduw, problems);
 
   EstimatorResult result;
   const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
@@ -170,21 +170,23 @@ EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& independent, c
   return result;
 }
 
-Estimator make_iduw(Settings& parameters) {
+Method make_iduw(Settings& parameters) {
   IduwOptions o;
   parameters.whole("window", o.window, kWindowRange, kWindowHelp);
 
-  Estimator estimator;
-  estimator.summary = "input-dependent uncorrelated weighting";
-  estimator.needs_sample_count = true;
-  estimator.fewest_groups = 4;
-  estimator.reach = -1;
-  estimator.memory.always = kIduwBytesPerPixel;
-  estimator.apply = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
+  PassPair pair;
+  pair.needs_sample_count = true;
+  pair.image = [o](const GroupedImage& crn, const GroupedImage& independent, const MethodSettings& settings) {
     IduwOptions options = o;
     options.samples = static_cast<int>(settings.crn_samples);
     return iduw(crn, independent, options);
   };
+  Method estimator;
+  estimator.passes = pair;
+  estimator.summary = "input-dependent uncorrelated weighting";
+  estimator.fewest_groups = 4;
+  estimator.reach = -1;
+  estimator.memory.always = kIduwBytesPerPixel;
   return estimator;
 }
 

@@ -18,7 +18,7 @@
 namespace covary {
 
 class Settings;
-struct Estimator;
+struct Method;
 
 struct IduwOptions {
   /// Side of the window; default 15, as in the authors' code; odd, 3 … 63.
@@ -39,7 +39,8 @@ EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& independent, c
 /// Approximate memory of iduw() beyond its input, including its result: bytes per pixel.
 inline constexpr double kIduwBytesPerPixel = (10 * 3 + 6 + 3) * sizeof(float) + 1;
 
+inline constexpr const char* kIduw = "iduw";
 /// The estimator `iduw` with these options. Throws Error(kUsage) listing everything wrong with them.
-Estimator make_iduw(Settings& options);
+Method make_iduw(Settings& options);
 
 }  // namespace covary

@@ -6,7 +6,7 @@
 
 #include "core/error.h"
 #include "estimators/control_variates.h"
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 #include "estimators/missing_light.h"
 #include "estimators/pilot.h"
 
@@ -81,7 +81,7 @@ double iicv_bytes_per_pixel(const IicvOptions& options) {
   return planes * sizeof(float) + 1;
 }
 
-Estimator make_iicv(Settings& parameters) {
+Method make_iicv(Settings& parameters) {
   static constexpr std::pair<const char*, Penalty> kPenalties[] = {
       {"pilot", Penalty::kPilot}, {"sample", Penalty::kSample}, {"asymmetric", Penalty::kAsymmetric}};
   Settings& p = parameters;
@@ -98,7 +98,15 @@ Estimator make_iicv(Settings& parameters) {
   AdaptiveSampling standard;
   standard.most_first_spp = std::numeric_limits<int>::max();
   standard.reads_groups = true;
-  Estimator estimator;
+  Method estimator;
+  PassPair pair;
+  pair.image = [o](const GroupedImage& crn, const GroupedImage& independent, const MethodSettings& settings) {
+    IicvOptions options = o;
+    options.std_error = settings.std_error;
+    return iicv(crn, independent, options);
+  };
+  pair.explain = explain_by_probe(iicv, o);
+  estimator.passes = pair;
   estimator.adaptive =
       ask_for_adaptive(p, standard, "The CRN pass decides how many independent samples each pixel gets");
 
@@ -110,12 +118,6 @@ Estimator make_iicv(Settings& parameters) {
   estimator.fewest_groups = 3;
   estimator.reach = iicv_reach(o);
   estimator.memory.always = iicv_bytes_per_pixel(o);
-  estimator.apply = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
-    IicvOptions options = o;
-    options.std_error = settings.std_error;
-    return iicv(crn, independent, options);
-  };
-  estimator.explain = explain_by_probe(iicv, o);
   return estimator;
 }
 

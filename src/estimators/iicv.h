@@ -27,7 +27,7 @@
 namespace covary {
 
 class Settings;
-struct Estimator;
+struct Method;
 
 /// How the error variances V_h of the independent image are estimated.
 enum class Penalty {
@@ -81,6 +81,6 @@ double iicv_bytes_per_pixel(const IicvOptions& options);
 
 inline constexpr const char* kIicv = "iicv";
 /// The estimator `iicv` with these options. Throws Error(kUsage) listing everything wrong with them.
-Estimator make_iicv(Settings& options);
+Method make_iicv(Settings& options);
 
 }  // namespace covary

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "estimators/control_variates.h"
-#include "estimators/estimator.h"
 #include "film/groups.h"
 
 namespace covary {
@@ -62,23 +60,6 @@ EstimatorResult mean_of_groups(const GroupedImage& image) {
       }
     }
   return result;
-}
-
-Estimator make_none(Settings& parameters) {
-  constexpr double kMomentsAndMask = 7 * sizeof(float);  // per pixel, for the error
-  Settings& p = parameters;
-  Estimator estimator;
-  estimator.name = estimator.text = kMeanName;
-  AdaptiveSampling standard;
-  standard.counts.first_pass_counts = false;
-  estimator.adaptive = ask_for_adaptive(
-      p, standard, "A first pass decides how many samples each pixel gets; if denoised, it is averaged in");
-  estimator.passes = EstimatorPasses::kAny;
-  estimator.summary = "the mean";
-  estimator.predicts_error = true;
-  estimator.splits_layers = !estimator.adaptive;
-  estimator.memory.of_halves = kMomentsAndMask, estimator.memory.groups_for_halves = 2;
-  return estimator;
 }
 
 }  // namespace covary

@@ -7,9 +7,6 @@
 
 namespace covary {
 
-class Settings;
-struct Estimator;
-
 /// Mean of the groups (unbiased) and, with two or more of them, its standard error (square root of an unbiased
 /// estimate). For groups of independent samples; errors of a CRN image have the same size but are correlated between
 /// pixels.
@@ -20,11 +17,5 @@ struct Estimator;
 /// counts. For images that keep the sample variance, the standard error follows from it, for any number of groups;
 /// infinite with fewer than two samples.
 EstimatorResult mean_of_groups(const GroupedImage& image);
-
-inline constexpr const char* kMeanName = "none";
-/// The mean with denoised images mixed in (denoising/mixed_denoising.h): covary's default.
-inline constexpr const char* kMixture = "mixture";
-/// The estimator `none` with these options. Throws Error(kUsage) listing everything wrong with them.
-Estimator make_none(Settings& options);
 
 }  // namespace covary

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 #include "film/grouped_image.h"
 
 namespace covary {
@@ -48,7 +48,7 @@ Spectrum polynomials(std::span<const Spectrum> values, std::span<const float> co
   if (problems.empty() && coordinates.size() != values.size() * static_cast<size_t>(dimensions))
     problems.push_back(fmt::format("{} coordinates for {} samples, expected {} of each", coordinates.size(),
                                    values.size(), dimensions));
-  throw_if_any("polynomials", problems);
+  throw_if_any(kPolynomials, problems);
 
   const auto n = static_cast<double>(values.size());
   double mean[3] = {0, 0, 0};  // of the values; finally the estimate
@@ -92,17 +92,18 @@ Spectrum polynomials(std::span<const Spectrum> values, std::span<const float> co
   return {static_cast<float>(mean[0]), static_cast<float>(mean[1]), static_cast<float>(mean[2])};
 }
 
-Estimator make_polynomials(Settings&) {
+Method make_polynomials(Settings&) {
   const PolynomialsOptions o;
-  Estimator estimator;
-  estimator.passes = EstimatorPasses::kSamples;
-  estimator.summary = "for direct light";
-  estimator.dimensions = o.dimensions;
-  estimator.film_settings = fmt::format("polynomials dimensions={}", o.dimensions);
-  estimator.estimate_pixel = [d = o.dimensions](std::span<const Spectrum> values, std::span<const float> coordinates) {
+  PixelPass pass;
+  pass.dimensions = o.dimensions;
+  pass.film_settings = fmt::format("{} dimensions={}", kPolynomials, o.dimensions);
+  pass.pixel = [d = o.dimensions](std::span<const Spectrum> values, std::span<const float> coordinates) {
     return polynomials(values, coordinates, d);
   };
-  estimator.check_samples = [d = o.dimensions](uint32_t samples) { return PolynomialsOptions{d, samples}.validate(); };
+  pass.check_samples = [d = o.dimensions](uint32_t samples) { return PolynomialsOptions{d, samples}.validate(); };
+  Method estimator;
+  estimator.passes = pass;
+  estimator.summary = "for direct light";
   return estimator;
 }
 

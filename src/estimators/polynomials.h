@@ -24,7 +24,7 @@
 namespace covary {
 
 class Settings;
-struct Estimator;
+struct Method;
 
 struct PolynomialsOptions {
   static constexpr int kMaxDimensions = 6;
@@ -48,7 +48,8 @@ struct PolynomialsOptions {
 /// coefficients (all in a plane, say), the estimate is the mean of the samples.
 Spectrum polynomials(std::span<const Spectrum> values, std::span<const float> coordinates, int dimensions);
 
+inline constexpr const char* kPolynomials = "polynomials";
 /// The estimator `polynomials` with these options. Throws Error(kUsage) listing everything wrong with them.
-Estimator make_polynomials(Settings& options);
+Method make_polynomials(Settings& options);
 
 }  // namespace covary

@@ -11,7 +11,7 @@ namespace covary {
 void copy_rows(const Image& part, int skipped, int y, int n, int height, Image& whole);
 
 /// Appends n rows of `part`, starting at its row `skipped`, to `whole`, whose next row is y: estimate, standard error,
-/// bias and the rows of held-out samples. Layers and sums over the image are left out.
-void append_rows(const EstimatorResult& part, int skipped, int y, int n, int height, EstimatorResult& whole);
+/// bias and what rows tell of the error. Layers and sums over the image are left out.
+void append_rows(const MethodImage& part, int skipped, int y, int n, int height, MethodImage& whole);
 
 }  // namespace covary

@@ -14,6 +14,7 @@
 #include "core/content_hash.h"
 #include "core/error.h"
 #include "core/shell_text.h"
+#include "risk/plain_mean.h"
 #include "sequences/frame_names.h"
 
 namespace covary::lab {
@@ -156,9 +157,10 @@ std::vector<Run> reference_runs(const Suite& suite, const SceneInstance& scene, 
   for (uint64_t seed : kReferenceSeeds) {
     Run run;
     run.seed = seed, run.frames = scene.frames;
-    run.options = joined({scene.options(),
-                          suite.common_options,
-                          {"--estimator", "none", "--spp", fmt::format("{}", spp), "--seed", fmt::format("{}", seed)}});
+    run.options =
+        joined({scene.options(),
+                suite.common_options,
+                {"--estimator", kMeanName, "--spp", fmt::format("{}", spp), "--seed", fmt::format("{}", seed)}});
     run.work = static_cast<double>(spp) * static_cast<double>(scene.n_pixels());
     run.key = key_of("reference", context, scene, {run.options});
     run.passes_key = run.key;

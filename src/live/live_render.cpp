@@ -24,7 +24,7 @@ constexpr double kLastSeconds = 3;        // that readers have to take the last 
 constexpr int kMostStride = 16;
 
 /// Whether the estimator makes another image of the films than their mean.
-bool makes_image(const Plan& plan) { return plan.estimator->apply && !plan.estimator->image_is_film(); }
+bool makes_image(const Plan& plan) { return !plan.method->film_holds_image(); }
 
 GroupedImage grouped(const Image& image) {
   GroupedImage groups;
@@ -74,7 +74,7 @@ void LiveRender::begun() {
     spp_ = largest_budget(scene, request);
     until_ = request.until;
   }
-  const bool may_grow = request.seconds <= 0 && plan.estimator->passes != EstimatorPasses::kSamples;
+  const bool may_grow = request.seconds <= 0 && !plan.method->pixel_pass();
   page_.say({{"phase", "preparing"},
              {"size", Json::array({window.width, window.height})},
              {"origin", Json::array({window.x, window.y})},
@@ -82,8 +82,8 @@ void LiveRender::begun() {
               {{"stop", true},
                {"pause", true},
                {"more", may_grow && spp_ < kMaxBudget / 2},
-               {"raise", may_grow && plan.estimator->predicts_error && !request.films_only},
-               {"region", plan.estimator->passes != EstimatorPasses::kSamples}}}});
+               {"raise", may_grow && plan.method->predicts_error && !request.films_only},
+               {"region", !plan.method->pixel_pass()}}}});
   say_goal();
   try {
     first_picture();
@@ -98,11 +98,11 @@ void LiveRender::first_picture() {
   if (inner.stop && inner.stop->load()) return;
   show("mean", image, stride);
   labels_["mean"] = "first samples";
-  if (makes_image(plan) && plan.estimator->passes == EstimatorPasses::kIndependent) {
+  if (makes_image(plan) && plan.method->one_pass()) {
     const Stopwatch watch;
-    PairSettings settings;
+    MethodSettings settings;
     settings.crn_samples = 1;
-    show("picture", plan.estimator->apply({}, grouped(image), settings).estimate, stride);
+    show("picture", plan.method->image({{}, grouped(image)}, settings).estimate, stride);
     denoised_pixel_cost_ = watch.seconds() / (static_cast<double>(image.width) * image.height);
     labels_["picture"] = "first samples";
   }
@@ -154,7 +154,7 @@ void LiveRender::show(const char* name, const Image& image, int stride) { page_.
 
 void LiveRender::say_pictures() {
   Json pictures = Json::array();
-  const bool denoised = of_->plan.estimator->passes == EstimatorPasses::kIndependent;
+  const bool denoised = of_->plan.method->one_pass() && makes_image(of_->plan);
   const std::pair<const char*, const char*> names[] = {{"mean", "Mean"}, {"picture", denoised ? "Denoised" : "Image"}};
   for (const auto& [id, name] : names)
     if (labels_.contains(id)) pictures.push_back({{"id", id}, {"name", name}, {"label", labels_[id]}});
@@ -191,13 +191,13 @@ void LiveRender::show_denoised(std::span<const Pass> passes) {
   if (!makes_image(plan)) return;
   const std::span<const Pass> cameras = camera_passes(passes);
   const Film &first = cameras.front().film, &last = cameras.back().film;
-  const bool is_pair = cameras.size() > 1 && plan.estimator->passes == EstimatorPasses::kPair;
+  const bool is_pair = cameras.size() > 1 && plan.method->pair();
   // Such estimators read counts and variances of samples, which only whole films have.
-  const bool whole = is_pair && plan.estimator->adaptive && !plan.estimator->adaptive->reads_groups;
+  const bool whole = is_pair && plan.method->adaptive && !plan.method->adaptive->reads_groups;
   int groups = std::min(first.groups(), last.groups());
   for (const Film* film : {&first, &last})
     for (const uint32_t count : film->counts()) groups = std::min<int>(groups, static_cast<int>(count));
-  if (!whole && (groups < plan.estimator->fewest_groups || groups < 1)) return;
+  if (!whole && (groups < plan.method->fewest_groups || groups < 1)) return;
   const double area = static_cast<double>(first.width()) * first.height() * denoised_pixel_cost_;
   int stride = 1;
   while (!whole && stride < kMostStride && !may_spend(area / (stride * stride))) stride *= 2;
@@ -208,12 +208,12 @@ void LiveRender::show_denoised(std::span<const Pass> passes) {
   };
   const CoarseGroups independent = taken(last), crn = is_pair ? taken(first) : CoarseGroups{};
   std::map<std::string, Image> aovs;
-  if (aovs_ && plan.estimator->reads_guides)
+  if (aovs_ && plan.method->reads_guides)
     for (const auto& [name, image] : *aovs_) aovs[name] = coarse_image(image, stride);
-  PairSettings settings;
+  MethodSettings settings;
   settings.crn_samples = std::max<int64_t>(1, std::llround(first.mean_count()));
   settings.guides = guides_among(aovs);
-  EstimatorResult made = plan.estimator->apply(crn.image, independent.image, settings);
+  EstimatorResult made = plan.method->image({crn.image, independent.image}, settings);
   show("picture", made.estimate, stride);
   page_.remove("picture:error");
   labels_["picture"] = fmt::format("{:.4g} samples per pixel{}", first.mean_count() + (is_pair ? last.mean_count() : 0),

@@ -28,7 +28,7 @@ constexpr double kOverestimate = 1.1;      // factor on the samples that the tim
 
 constexpr uint32_t kFirstOfError = 50;  // samples of the first pass if a relative error determines the rest
 
-struct Method {
+struct AdaptiveMethod {
   AdaptiveSampling sampling;
   std::string name;
   std::optional<int> groups;  ///< as requested
@@ -46,7 +46,7 @@ struct Method {
 };
 
 /// Samples per pixel of the first pass.
-uint32_t first_samples(const Method& method, const PlanState& state) {
+uint32_t first_samples(const AdaptiveMethod& method, const PlanState& state) {
   if (method.sampling.first_spp) return static_cast<uint32_t>(*method.sampling.first_spp);
   const uint32_t groups = method.groups_of(state);
   if (method.denoise) {
@@ -60,13 +60,13 @@ uint32_t first_samples(const Method& method, const PlanState& state) {
 }
 
 /// Maximum samples per pixel; infinite if only a relative error limits them.
-double whole_budget(const Method& method, const PlanState& state) {
+double whole_budget(const AdaptiveMethod& method, const PlanState& state) {
   const bool is_open = method.sampling.counts.relative_error && !state.request.spp && !state.seconds_left;
   return is_open ? std::numeric_limits<double>::infinity() : state.budget;
 }
 
 /// An estimator that reads groups needs some, each with a sample of the first pass.
-void check_groups(const Method& method, const PlanState& state, uint32_t first) {
+void check_groups(const AdaptiveMethod& method, const PlanState& state, uint32_t first) {
   if (!method.sampling.reads_groups) return;
   const uint32_t groups = method.groups_of(state);
   if (groups < static_cast<uint32_t>(method.fewest_groups))
@@ -78,7 +78,7 @@ void check_groups(const Method& method, const PlanState& state, uint32_t first) 
                                                first, groups));
 }
 
-void check_budget(const Method& method, const PlanState& state, uint32_t first) {
+void check_budget(const AdaptiveMethod& method, const PlanState& state, uint32_t first) {
   const double budget = whole_budget(method, state);
   const int least = std::max({1, method.sampling.counts.min_spp, static_cast<int>(method.groups_of(state))});
   if (budget >= static_cast<double>(first) + least) return;
@@ -99,12 +99,12 @@ double samples_in_time(const PlanState& state, double seconds_ago) {
 
 /// Whether an error map of these samples shows where errors are, rather than where single bright paths landed.
 bool tells_where_errors_are(const GroupedImage& image) {
-  EstimatorResult mean = mean_of_groups(image);
+  MethodImage mean = mean_of_groups(image);
   add_risk_of_mean(image, mean);
   return mean.risk_rows.empty() || !has_rare_light(sum_of(mean.risk_rows));
 }
 
-void set_last_target(const Method& method, const PlanState& state, Pass& last) {
+void set_last_target(const AdaptiveMethod& method, const PlanState& state, Pass& last) {
   const Stopwatch watch;
   const Film& first = state.passes[0].film;
   const GroupedImage image = rows_of(first, 0, first.height());
@@ -134,53 +134,21 @@ PassPlan pass_of(const std::string& name, Sampling sampling, uint32_t number, ui
   return pass;
 }
 
-EstimatorResult mean_of_last(std::span<const Pass> passes, int first_row, int n_rows, const Beside&) {
-  const GroupedImage groups = rows_of(passes.back().film, first_row, n_rows);
-  EstimatorResult mean = mean_of_groups(groups);
-  add_risk_of_mean(groups, mean);
-  return mean;
-}
-
-void set_estimate(const Estimator& estimator, Plan& plan) {
-  const auto apply = estimator.apply;
-  if (estimator.passes == EstimatorPasses::kAny) {
-    plan.estimate = mean_of_last;
-    return;
-  }
-  if (estimator.passes == EstimatorPasses::kPair) {
-    plan.estimate = [apply, std_error = estimator.predicts_error](std::span<const Pass> passes, int first_row,
-                                                                  int n_rows, const Beside&) {
-      const Film &crn = passes[0].film, &independent = passes[1].film;
-      return apply(rows_of(crn, first_row, n_rows), rows_of(independent, first_row, n_rows),
-                   {std::llround(crn.mean_count()), std_error, {}});
-    };
-    return;
-  }
-  plan.estimate = [apply](std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside) {
-    const Film film = joined(passes[0].film, passes[1].film);
-    PairSettings settings;
-    settings.std_error = true;
-    settings.guides = beside.guides;
-    return apply({}, rows_of(film, first_row, n_rows), settings);
-  };
-}
-
 }  // namespace
 
-Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups) {
-  const bool is_pair = estimator.passes == EstimatorPasses::kPair;
-  const bool is_denoised = estimator.passes == EstimatorPasses::kIndependent;
+Plan adaptive_plan(const Method& estimator, std::optional<int> groups) {
+  const bool is_pair = estimator.pair() != nullptr, is_denoised = !is_pair && !estimator.is_mean();
   if (estimator.adaptive->counts.relative_error && is_denoised)
     throw Error(ErrorCode::kUsage,
                 "`until` relative is for an image that is not denoised; relmse adds samples until a denoised one has a "
                 "wanted error");
-  const Method method{*estimator.adaptive, estimator.name, groups, estimator.fewest_groups,
-                      is_denoised ? DenoisedMean(estimator.apply) : DenoisedMean()};
+  const AdaptiveMethod method{*estimator.adaptive, estimator.name, groups, estimator.fewest_groups,
+                              is_denoised ? estimator.one_pass()->image : DenoisedMean()};
   Plan plan = plan_of(estimator);
   plan.takes_unfinished = is_denoised || (is_pair && !method.sampling.reads_groups);
   plan.groups_follow_speed = is_denoised && !groups;
   plan.has_crn_pass = is_pair;
-  set_estimate(estimator, plan);
+  plan.adds_films = is_denoised;
   Phase first, last;
   first.share = last.share = kFirstShare;
   first.passes = [=](const PlanState& state) {

@@ -5,7 +5,7 @@
 
 #include <optional>
 
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 #include "plans/plan.h"
 
 namespace covary {
@@ -25,6 +25,6 @@ namespace covary {
 /// `groups`: of both films; default: 1, or number_of_groups() of budget.h if the estimator reads them. Numbers of
 /// samples of the last pass are multiples of it. Rendering throws Error(kUsage) if the budget leaves less than one
 /// sample, or min_spp, for the last pass, or if an estimator that reads groups gets too few.
-Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups = {});
+Plan adaptive_plan(const Method& estimator, std::optional<int> groups = {});
 
 }  // namespace covary

@@ -37,7 +37,7 @@ Plan plain_adaptive(OptionValues options = {}) {
 }
 
 /// A denoised mean that uses only filters.
-Estimator denoised() {
+Method denoised() {
   return with_denoising(make_estimator("none", {{"adaptive", ""}}),
                         {.mode = DenoiseMode::kAuto, .use_oidn = false, .oidn = {}});
 }
@@ -65,9 +65,9 @@ TEST(AdaptivePlan, OptionsOfTheEstimatorReachIt) {
   const OptionValues options = {{"paper", ""}, {"max-region", "3"}};
   const RenderResult result = render(scene, plan_of("dependent-tests", options), request_of(48));
   const Film &crn = result.passes[0].film, &independent = result.passes[1].film;
-  const Estimator estimator = make_estimator("dependent-tests", options);
+  const Method estimator = make_estimator("dependent-tests", options);
   EXPECT_EQ(result.image.estimate.data,
-            estimator.apply(rows_of(crn, 0, 30), rows_of(independent, 0, 30), {}).estimate.data);
+            estimator.image({rows_of(crn, 0, 30), rows_of(independent, 0, 30)}, {}).estimate.data);
   for (const uint32_t n : independent.counts()) EXPECT_EQ(n, class_of(n)) << "classes";
 }
 
@@ -85,7 +85,7 @@ TEST(AdaptivePlan, ControlVariatesOfUnequalNumbers) {
   EXPECT_GT(*most, *least);
   for (const uint32_t n : independent.counts()) EXPECT_TRUE(n >= 12 && n % 12 == 0);
   EXPECT_EQ(result.image.estimate.data,
-            make_estimator("iicv").apply(rows_of(crn, 0, 30), rows_of(independent, 0, 30), {96, true}).estimate.data);
+            make_estimator("iicv").image({rows_of(crn, 0, 30), rows_of(independent, 0, 30)}, {96, true}).estimate.data);
   ASSERT_TRUE(result.predicted);
   EXPECT_GT(result.predicted->relmse, 0);
 }
@@ -95,7 +95,7 @@ TEST(AdaptivePlan, ARelativeErrorTakesThePlaceOfTheBudget) {
   RenderRequest request = request_of(1);
   request.spp.reset();
   const auto plan_until = [](float error, const OptionValues& options = {}) {
-    Estimator estimator = make_estimator("dependent-tests", options);
+    Method estimator = make_estimator("dependent-tests", options);
     estimator.adaptive->counts.relative_error = error;
     return adaptive_plan(estimator);
   };
@@ -126,7 +126,7 @@ TEST(AdaptivePlan, TooSmallABudgetIsAnError) {
                        "least 1 must be left"));
   EXPECT_TRUE(contains(message(1, {}), "too few"));
   const auto of_iicv = [&](const char* first, std::optional<int> groups) {
-    const Estimator iicv = make_estimator("iicv", {{"adaptive", ""}, {"dependent-spp", first}});
+    const Method iicv = make_estimator("iicv", {{"adaptive", ""}, {"dependent-spp", first}});
     return message_of([&] { render(scene, adaptive_plan(iicv, groups), request_of(48)); }, ErrorCode::kUsage);
   };
   EXPECT_EQ(of_iicv("24", 2), "2 groups are too few: iicv needs at least 3");
@@ -218,7 +218,7 @@ TEST(AdaptivePlan, FilmsOfTwoSeedsMerge) {
   const std::vector<std::string> names = {"a", "b"};
   const Film g = merge_films(crn, names), h = merge_films(independent, names);
   EXPECT_EQ(h.count(7, 9), independent[0].count(7, 9) + independent[1].count(7, 9));
-  const EstimatorResult result = make_estimator("dependent-tests").apply(rows_of(g, 0, 30), rows_of(h, 0, 30), {});
+  const EstimatorResult result = make_estimator("dependent-tests").image({rows_of(g, 0, 30), rows_of(h, 0, 30)}, {});
   for (const float value : result.estimate.data) EXPECT_TRUE(std::isfinite(value));
 }
 
@@ -226,7 +226,7 @@ TEST(AdaptivePlan, FilmsOfTwoSeedsMerge) {
 TEST(AdaptivePlan, CropsHaveTheFramesFirstPass) {
   const LoadedScene scene = load_sized(kRoom);
   RenderRequest request = request_of(24);
-  Estimator uniform = make_estimator("dependent-tests");
+  Method uniform = make_estimator("dependent-tests");
   uniform.adaptive->counts.allocation = Allocation::kUniform;
   const RenderResult frame = render(scene, adaptive_plan(uniform), request);
   request.crop = CropWindow{8, 5, 20, 15};

@@ -18,10 +18,10 @@ constexpr uint32_t kTrialPass = 2;  // pass number in its random numbers, which 
 }  // namespace
 
 std::vector<double> filtered_errors(const DenoisedMean& denoise, const Film& first, const PlanState& state) {
-  PairSettings settings;
+  MethodSettings settings;
   settings.std_error = true;
   settings.guides = state.guides;
-  const EstimatorResult image = denoise({}, rows_of(first, 0, first.height()), settings);
+  const EstimatorResult image = denoise(rows_of(first, 0, first.height()), settings);
   std::vector<double> errors(first.counts().size());
   if (image.std_error.data.empty()) return errors;
   PassSettings trial;

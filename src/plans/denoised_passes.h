@@ -2,17 +2,15 @@
 // Two independent passes of one denoised mean: sampling of the second one, and the film of both.
 #pragma once
 
-#include <functional>
 #include <vector>
 
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 #include "plans/plan.h"
 
 namespace covary {
 
-/// Estimator::apply of a denoised mean.
-using DenoisedMean =
-    std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent, const PairSettings&)>;
+/// OnePass::image of a denoised mean.
+using DenoisedMean = decltype(OnePass::image);
 
 /// For sample_counts(): squared relative error of the denoised image of `first` at each pixel, over the cost of a
 /// sample there. All 0 if the image has no error estimate.

@@ -7,12 +7,12 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "estimators/mean.h"
 #include "integrators/primary_sample.h"
 #include "plans/adaptive_plan.h"
 #include "plans/budget.h"
+#include "plans/denoised_passes.h"
 #include "plans/render.h"
-#include "risk/image_risk.h"
+#include "risk/plain_mean.h"
 
 namespace covary {
 namespace {
@@ -29,15 +29,6 @@ PixelEstimate pixel_estimate(const PixelFunction& estimate, int dimensions) {
   };
 }
 
-EstimatorResult mean_of_first(std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside) {
-  const GroupedImage groups = rows_of(passes[0].film, first_row, n_rows);
-  EstimatorResult mean = mean_of_groups(groups);
-  // With common random numbers, errors are correlated between pixels, which variances do not show.
-  if (passes[0].plan.sampling == Sampling::kIndependent) add_risk_of_mean(groups, mean);
-  for (const Layer& layer : beside.layers) mean.layers.push_back(mean_of_groups(layer.image).estimate);
-  return mean;
-}
-
 /// A single pass of `groups` groups takes the whole budget.
 Shares whole_budget(int groups) { return {{1.0}, static_cast<uint32_t>(groups)}; }
 
@@ -46,18 +37,18 @@ void set_only_target(const PlanState& state, std::span<Pass> passes) {
 }
 
 /// The same for all methods that need no more, so that they can share films: at least four groups.
-Shares shares_of(const Estimator& estimator, const PassChoice& choice) {
+Shares shares_of(const Method& estimator, const PassChoice& choice) {
   constexpr int kEnough = 4;
   const int fewest = choice.groups.value_or(std::max(kEnough, estimator.fewest_groups));
-  const std::array<double, 2> split = choice.split.value_or(estimator.split);
+  const std::array<double, 2> split = choice.split.value_or(std::array{0.5, 0.5});
   return {{split.begin(), split.end()}, static_cast<uint32_t>(fewest)};
 }
 
 }  // namespace
 
-Plan plan_of(const Estimator& estimator) {
+Plan plan_of(const Method& method) {
   Plan plan;
-  plan.estimator = std::make_shared<const Estimator>(estimator);
+  plan.method = std::make_shared<const Method>(method);
   return plan;
 }
 
@@ -66,7 +57,6 @@ Plan plain_plan(Sampling sampling, std::optional<int> groups) {
   Plan plan = plan_of(make_none(defaults));
   plan.has_crn_pass = sampling == Sampling::kCrn;
   plan.takes_training = !plan.has_crn_pass;
-  plan.estimate = mean_of_first;
   Phase phase;
   phase.passes = [=](const PlanState& state) {
     PassPlan pass;
@@ -83,17 +73,9 @@ Plan plain_plan(Sampling sampling, std::optional<int> groups) {
   return plan;
 }
 
-Plan independent_plan(const Estimator& estimator, std::optional<int> groups) {
+Plan independent_plan(const Method& estimator, std::optional<int> groups) {
   Plan plan = plan_of(estimator);
   plan.groups_follow_speed = !groups;
-  plan.estimate = [apply = estimator.apply](std::span<const Pass> passes, int first_row, int n_rows,
-                                            const Beside& beside) {
-    PairSettings settings;
-    settings.std_error = true;
-    settings.guides = beside.guides;
-    settings.layers = beside.layers;
-    return apply({}, rows_of(passes[0].film, first_row, n_rows), settings);
-  };
   Phase phase;
   phase.passes = [groups](const PlanState& state) {
     PassPlan pass;
@@ -107,18 +89,17 @@ Plan independent_plan(const Estimator& estimator, std::optional<int> groups) {
   return plan;
 }
 
-Plan samples_plan(const Estimator& estimator) {
+Plan samples_plan(const Method& estimator) {
   Plan plan = plan_of(estimator);
-  plan.estimate = mean_of_first;
   Phase phase;
-  phase.passes = [=](const PlanState& state) {
-    throw_if_any(estimator.name, estimator.check_samples(state.group_budget));
+  phase.passes = [of = *estimator.pixel_pass(), name = estimator.name, text = estimator.text](const PlanState& state) {
+    throw_if_any(name, of.check_samples(state.group_budget));
     PassPlan pass;
     pass.name = "independent";
-    pass.estimate = pixel_estimate(estimator.estimate_pixel, estimator.dimensions);
-    pass.estimator = estimator.text;
+    pass.estimate = pixel_estimate(of.pixel, of.dimensions);
+    pass.estimator = text;
     // The number of samples is one of the settings: an estimate from few samples cannot be extended.
-    pass.settings = fmt::format("; {} samples={}", estimator.film_settings, state.group_budget);
+    pass.settings = fmt::format("; {} samples={}", of.film_settings, state.group_budget);
     return std::vector{pass};
   };
   phase.set_targets = set_only_target;
@@ -126,15 +107,10 @@ Plan samples_plan(const Estimator& estimator) {
   return plan;
 }
 
-Plan pair_plan(const Estimator& estimator, const PassChoice& choice) {
+Plan pair_plan(const Method& estimator, const PassChoice& choice) {
   Plan plan = plan_of(estimator);
   plan.has_crn_pass = true;
   plan.groups_follow_speed = !choice.groups;
-  plan.estimate = [apply = estimator.apply, std_error = estimator.predicts_error](
-                      std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside) {
-    const PairSettings settings{std::llround(passes[0].film.mean_count()), std_error, true, beside.guides, {}};
-    return apply(rows_of(passes[0].film, first_row, n_rows), rows_of(passes[1].film, first_row, n_rows), settings);
-  };
   const Shares shares = shares_of(estimator, choice);
   Phase phase;
   phase.passes = [=, name = estimator.name, fewest = estimator.fewest_groups,
@@ -155,12 +131,27 @@ Plan pair_plan(const Estimator& estimator, const PassChoice& choice) {
   return plan;
 }
 
-Plan estimator_plan(const Estimator& estimator, const PassChoice& choice) {
+MethodImage image_of(const Plan& plan, std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside) {
+  const Method& method = *plan.method;
+  MethodSettings settings;
+  settings.crn_samples = std::llround(passes[0].film.mean_count());
+  settings.std_error = method.predicts_error;
+  // With common random numbers, errors of a mean are correlated between pixels, which variances do not show.
+  settings.held_out = method.pair() || passes[0].plan.sampling == Sampling::kIndependent;
+  settings.guides = beside.guides, settings.layers = beside.layers;
+  const Film sum = plan.adds_films ? joined(passes[0].film, passes[1].film) : Film();
+  Samples samples;
+  samples.independent = rows_of(plan.adds_films ? sum : passes.back().film, first_row, n_rows);
+  if (method.pair()) samples.crn = rows_of(passes[0].film, first_row, n_rows);
+  return method.image(samples, settings);
+}
+
+Plan estimator_plan(const Method& estimator, const PassChoice& choice) {
   if (estimator.adaptive) return adaptive_plan(estimator, choice.groups);
-  if (estimator.passes == EstimatorPasses::kAny) return plain_plan(choice.sampling, choice.groups);
-  if (estimator.passes == EstimatorPasses::kIndependent) return independent_plan(estimator, choice.groups);
-  if (estimator.passes == EstimatorPasses::kSamples) return samples_plan(estimator);
-  return pair_plan(estimator, choice);
+  if (estimator.pair()) return pair_plan(estimator, choice);
+  if (estimator.pixel_pass()) return samples_plan(estimator);
+  if (estimator.is_mean()) return plain_plan(choice.sampling, choice.groups);
+  return independent_plan(estimator, choice.groups);
 }
 
 }  // namespace covary

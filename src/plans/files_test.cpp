@@ -91,11 +91,9 @@ TEST(Passes, AFileInPlaceOfTheFolderIsNamed) {
 
 /// A plan of two passes whose estimator fails.
 Plan failing_plan() {
-  Plan plan = average_plan();
-  plan.estimate = [](std::span<const Pass>, int, int, const Beside&) -> EstimatorResult {
+  return with_image(average_plan(), [](const auto&, const auto&) -> EstimatorResult {
     throw Error(ErrorCode::kInput, "no image today");
-  };
-  return plan;
+  });
 }
 
 /// `path`, but it fails if radiance is separated by number of edges.
@@ -153,14 +151,13 @@ TEST(Failure, FilmsOfAFolderAreThereBeforeTheEstimate) {
   const TemporaryFolder folder;
   RenderRequest request = request_of(24);
   request.output = folder.file("a.exr"), request.passes = folder.file("films");
-  Plan plan = average_plan();
-  plan.estimate = [&, make = plan.estimate](std::span<const Pass> passes, int row, int n_rows, const Beside& beside) {
+  const Plan plan = with_image(average_plan(), [&](const auto& make, const auto&) {
     for (const char* name : {"films/crn.exr", "films/independent.exr"}) {
       EXPECT_EQ(read_film(folder.file(name)).mean_count(), 12) << name;
       EXPECT_EQ(attribute_of(folder.file(name), "complete"), "true") << name;
     }
-    return make(passes, row, n_rows, beside);
-  };
+    return make();
+  });
   render(scene, plan, request);
 }
 
@@ -169,18 +166,17 @@ TEST(Estimate, GetsAllAuxiliaryImagesAsGuides) {
   const TemporaryFolder folder;
   RenderRequest request = request_of(24);
   request.output = folder.file("a.exr");
-  Estimator guided_average = average_estimator();
+  Method guided_average = average_estimator();
   guided_average.reads_guides = true;
-  Plan plan = pair_plan(guided_average);
   std::map<std::string, std::vector<float>> guided;
-  plan.estimate = [&, make = plan.estimate](std::span<const Pass> passes, int row, int n_rows, const Beside& beside) {
-    guided = {{"Albedo", beside.guides.albedo->data},
-              {"N", beside.guides.normal->data},
-              {"DenoisingAlbedo", beside.guides.denoising_albedo->data},
-              {"DenoisingNormal", beside.guides.denoising_normal->data},
-              {"P", beside.guides.position->data}};
-    return make(passes, row, n_rows, beside);
-  };
+  const Plan plan = with_image(pair_plan(guided_average), [&](const auto& make, const MethodSettings& settings) {
+    guided = {{"Albedo", settings.guides.albedo->data},
+              {"N", settings.guides.normal->data},
+              {"DenoisingAlbedo", settings.guides.denoising_albedo->data},
+              {"DenoisingNormal", settings.guides.denoising_normal->data},
+              {"P", settings.guides.position->data}};
+    return make();
+  });
   const RenderResult result = render(scene, plan, request);
   for (const auto& [name, data] : guided) EXPECT_EQ(data, result.aovs.at(name).data) << name;
   EXPECT_EQ(guided.size(), std::size(kAuxiliaryImages));
@@ -212,11 +208,10 @@ TEST(Failure, FilmsOfAnImageThatCannotBeWrittenAreKept) {
   fs::create_directory(folder.file("images"));
   RenderRequest request = request_of(24);
   request.output = folder.file("images/a.exr"), request.passes = folder.file("films");
-  Plan plan = average_plan();
-  plan.estimate = [&, make = plan.estimate](std::span<const Pass> passes, int row, int n_rows, const Beside& beside) {
+  const Plan plan = with_image(average_plan(), [&](const auto& make, const auto&) {
     fs::remove(folder.file("images"));
-    return make(passes, row, n_rows, beside);
-  };
+    return make();
+  });
   warnings_of_failure("no such folder", scene, plan, request);
   EXPECT_EQ(read_film(folder.file("films/crn.exr")).mean_count(), 12);
   EXPECT_FALSE(fs::exists(folder.file("films/.lock")));
@@ -250,7 +245,7 @@ TEST(FolderLock, NamesTheProcessThatHoldsTheFolder) {
 TEST(Memory, CountsFilmsAuxiliaryImagesAndEstimator) {
   const LoadedScene scene = load_sized(kRoom, 100, 50);
   RenderRequest request = request_of(48);
-  Estimator average = average_estimator();
+  Method average = average_estimator();
   const auto memory_now = [&] { return render_memory(scene, pair_plan(average), request); };
   average.memory.always = 100;
   const RenderMemory memory = memory_now();
@@ -269,7 +264,7 @@ TEST(Memory, CountsFilmsAuxiliaryImagesAndEstimator) {
 
 TEST(Memory, MoreThanTheLimitIsRefusedBeforeItIsTaken) {
   const LoadedScene scene = load_sized(kRoom);
-  Estimator average = average_estimator();
+  Method average = average_estimator();
   average.memory.always = memory_limit();
   EXPECT_TRUE(contains(message_of([&] { render(scene, pair_plan(average), request_of(24)); }, ErrorCode::kUsage),
                        "40 x 30 pixels need "));

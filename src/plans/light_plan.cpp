@@ -20,7 +20,7 @@ namespace {
 /// groups.
 int with_error(const Plan& plan, int groups) {
   constexpr int kUsual = 12;
-  return groups == 1 && plan.estimator->predicts_error && !plan.film_is_image() ? kUsual : groups;
+  return groups == 1 && plan.method->predicts_error && !plan.makes_film() ? kUsual : groups;
 }
 
 }  // namespace

@@ -83,9 +83,8 @@ TEST(LightPlan, BesideCrnThereIsOneWhereItIsAskedFor) {
   EXPECT_EQ(light_paths_of(on), 24u * kWidth * kHeight / 2);
   // The estimator reads the camera's films; the mean of the light film is added, and so are variances.
   const Film &crn = on.passes[0].film, &independent = on.passes[1].film;
-  EstimatorResult expected =
-      make_estimator("iicv").apply(rows_of(crn, 0, kHeight), rows_of(independent, 0, kHeight), {12, true});
-  finish(expected, nullptr);
+  const EstimatorResult expected =
+      finish(make_estimator("iicv").image({rows_of(crn, 0, kHeight), rows_of(independent, 0, kHeight)}, {12, true}));
   const EstimatorResult light = mean_of_groups(rows_of(on.passes[2].film, 0, kHeight));
   for (size_t i = 0; i < expected.estimate.data.size(); ++i) {
     ASSERT_EQ(on.image.estimate.data[i], expected.estimate.data[i] + light.estimate.data[i]);
@@ -219,10 +218,10 @@ TEST(LightPlan, UntilAWantedErrorLightPathsKeepStep) {
   EXPECT_GT(result.samples_per_pixel(), 96);
   EXPECT_NEAR(static_cast<double>(light_paths_of(result)), result.samples_per_pixel() * kWidth * kHeight,
               4 * kBundlePaths);
-  EstimatorResult expected = mean_of_groups(rows_of(result.passes[0].film, 0, kHeight));
-  add_risk_of_mean(rows_of(result.passes[0].film, 0, kHeight), expected);
+  MethodImage image = mean_of_groups(rows_of(result.passes[0].film, 0, kHeight));
+  add_risk_of_mean(rows_of(result.passes[0].film, 0, kHeight), image);
   const GroupedImage light = rows_of(result.passes[1].film, 0, kHeight);
-  finish(expected, &light);
+  const EstimatorResult expected = finish(image, &light);
   EXPECT_EQ(result.predicted->relmse, predicted_error(expected, 0, 0)->relmse);
 }
 
@@ -281,10 +280,6 @@ TEST(LightPlan, TheLightPassComesWithTheLastPhase) {
     passes[0].settings.spp = SampleTarget(map);
   };
   plan.phases.insert(plan.phases.begin(), first);
-  plan.estimate = [](std::span<const Pass> passes, int first_row, int n_rows, const Beside&) {
-    EXPECT_EQ(passes.size(), 2u);
-    return mean_of_groups(rows_of(passes[1].film, first_row, n_rows));
-  };
   const RenderResult result = render(scene, plan, request_of(16));
   ASSERT_EQ(result.passes.size(), 3u);
   EXPECT_EQ(result.passes[2].plan.id(), "light");

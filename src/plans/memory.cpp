@@ -33,11 +33,11 @@ RenderMemory render_memory(const Plan& plan, std::span<const PassPlan> passes, i
     fewest_groups = std::min(fewest_groups, pass.groups);
     const double film = n_pixels * ((pass.groups + (pass.sample_variance ? 1 : 0)) * kImageBytes + sizeof(uint32_t));
     memory.films += film + (pass.light ? kSplatBytes : 0);
-    if (pass.light && plan.film_is_image()) memory.estimate += film;  // the sum of both films
+    if (pass.light && plan.makes_film()) memory.estimate += film;  // the sum of both films
   }
   if (aovs) memory.films += n_pixels * std::size(kAuxiliaryImages) * kImageBytes;
   // A copy for a viewer or the preview.
-  memory.estimate += plan.estimator->memory.bytes(n_pixels, fewest_groups) + n_pixels * kImageBytes;
+  memory.estimate += plan.method->memory.bytes(n_pixels, fewest_groups) + n_pixels * kImageBytes;
   return memory;
 }
 
@@ -49,7 +49,7 @@ RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const Ren
   for (const Phase& phase : plan.phases)
     for (const PassPlan& pass : phase.passes(state)) passes.push_back(pass);
   if (has_light_pass(scene, plan, request)) passes.push_back(light_pass_plan(plan, passes));
-  const bool aovs = request.aovs || plan.estimator->reads_guides;
+  const bool aovs = request.aovs || plan.method->reads_guides;
   RenderMemory memory = render_memory(plan, passes, window.width, window.height, aovs);
   memory.training = training_memory(scene, request);
   if (request.splits_layers()) {

@@ -127,11 +127,12 @@ constexpr const char* kWaysOut =
     "`resume` continues it, or takes it as it is where it has enough samples, and "
     "`overwrite` replaces it";
 
-}  // namespace
-
-bool output_is_film(const Plan& plan, const RenderRequest& request) {
-  return plan.film_is_image() && !plan.traces_light && request.passes.empty();
+/// Whether the film of the only pass is the output's file.
+bool outputs_film(const Plan& plan, const RenderRequest& request) {
+  return plan.makes_film() && !plan.traces_light && request.passes.empty();
 }
+
+}  // namespace
 
 fs::path passes_folder(const RenderRequest& request) {
   if (!request.passes.empty()) return request.passes;
@@ -139,14 +140,14 @@ fs::path passes_folder(const RenderRequest& request) {
 }
 
 std::string pass_path(const Plan& plan, const RenderRequest& request, const PassPlan& pass) {
-  if (output_is_film(plan, request)) return request.output;
+  if (outputs_film(plan, request)) return request.output;
   const fs::path folder = passes_folder(request);
   return folder.empty() ? "" : (folder / (pass.id() + ".exr")).string();
 }
 
 void check_earlier_films(const Plan& plan, const RenderRequest& request) {
   if (request.output.empty() || request.overwrite) return;
-  const bool is_film = output_is_film(plan, request);
+  const bool is_film = outputs_film(plan, request);
   // With a folder for films, the output is a copy of one.
   const bool continues = request.resume && (is_film || !request.passes.empty());
   if (!continues && is_unfinished_film(request.output))
@@ -170,12 +171,11 @@ void check_earlier_films(const Plan& plan, const RenderRequest& request) {
     check_made_alike(request.output, made_of->second, request.resume);
 }
 
-void take_film_on_disk(const Plan& plan, const RenderRequest& request,
-                       const std::function<void(const std::string&)>& warn, Pass& pass) {
-  const bool kept = !request.passes.empty(), is_output = output_is_film(plan, request);
-  pass.temporary = !kept && !is_output && !pass.path.empty();
+void take_film_on_disk(const RenderRequest& request, const std::function<void(const std::string&)>& warn, Pass& pass) {
+  const bool kept = !request.passes.empty(), is_film = is_output(pass, request);
+  pass.temporary = !kept && !is_film && !pass.path.empty();
   if (pass.path.empty()) return;
-  if (!is_output && fs::is_symlink(pass.path))
+  if (!is_film && fs::is_symlink(pass.path))
     throw Error(ErrorCode::kInput,
                 fmt::format("'{}' is a symbolic link; films are not written through links; remove it, or "
                             "give another name for the folder or the output",
@@ -184,7 +184,7 @@ void take_film_on_disk(const Plan& plan, const RenderRequest& request,
   if (request.resume) {
     resume(request, pass);
     if (kept && fs::exists(costs_path(pass))) read_costs(warn, pass);
-  } else if (!is_output) {
+  } else if (!is_film) {
     if (!request.overwrite) throw Error(ErrorCode::kInput, fmt::format("'{}' already exists; {}", pass.path, kWaysOut));
     check_replaceable(pass.path);
   }
@@ -193,7 +193,7 @@ void take_film_on_disk(const Plan& plan, const RenderRequest& request,
 void save_passes(const RenderRequest& request, std::span<Pass> passes, bool complete) {
   for (Pass& pass : passes) {
     if (pass.path.empty()) continue;
-    if (pass.path != request.output) make_folder(passes_folder(request));
+    if (!is_output(pass, request)) make_folder(passes_folder(request));
     pass.film.attributes[film_key::kComplete] = complete ? "true" : "false";
     if (pass.temporary) pass.film.attributes[film_key::kTemporary] = "true";
     write_film(pass.path, pass.film);

@@ -23,8 +23,8 @@ inline constexpr const char* kBudgets = "budgets";         ///< of a render to a
 inline constexpr const char* kTimeChoice = "time_choice";
 }  // namespace film_key
 
-/// Whether the result's file is the film itself, which can be continued.
-bool output_is_film(const Plan& plan, const RenderRequest& request);
+/// Whether the output's file is this film, which can be continued.
+inline bool is_output(const Pass& pass, const RenderRequest& request) { return pass.path == request.output; }
 
 /// The folder of the films while the plan runs; empty if the request names no file.
 std::filesystem::path passes_folder(const RenderRequest& request);
@@ -42,8 +42,7 @@ void check_earlier_films(const Plan& plan, const RenderRequest& request);
 /// is temporary: it belongs neither to a folder named by the request nor to an earlier render's. Throws Error(kInput)
 /// for a film that does not match, for a file that is neither resumed nor overwritten, for a file that is not a film,
 /// and for a symbolic link, which might lead out of the folder.
-void take_film_on_disk(const Plan& plan, const RenderRequest& request,
-                       const std::function<void(const std::string&)>& warn, Pass& pass);
+void take_film_on_disk(const RenderRequest& request, const std::function<void(const std::string&)>& warn, Pass& pass);
 
 /// Writes the films, so that the render can be resumed.
 void save_passes(const RenderRequest& request, std::span<Pass> passes, bool complete);

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 #include "film/film.h"
 #include "io/load_scene.h"
 #include "passes/integrator.h"
@@ -77,7 +77,7 @@ struct PlanState {
   /// With a time limit: the time left for everything that follows when a phase's targets are set.
   std::optional<double> seconds_left;
   std::vector<Pass> passes;  ///< of this phase and all earlier ones, in the plan's order
-  Guides guides;             ///< of the whole window, for the targets of the last phase, if Estimator::reads_guides
+  Guides guides;             ///< of the whole window, for the targets of the last phase, if Method::reads_guides
 
   /// The pass with this name and number. Throws Error(kInternal) if none has begun.
   const Pass& pass(const std::string& name, uint32_t number = 0) const;
@@ -95,30 +95,32 @@ struct Phase {
   std::function<void(const PlanState&, std::span<Pass>)> set_targets;
 };
 
-/// What an estimate may read in addition to the films, for its rows.
+/// What a method may read in addition to the films, for its rows.
 struct Beside {
-  Guides guides;              ///< if Estimator::reads_guides
-  std::vector<Layer> layers;  ///< if Estimator::splits_layers; empty if none were requested
+  Guides guides;              ///< if Method::reads_guides
+  std::vector<Layer> layers;  ///< if Method::splits_layers(); empty if none were requested
 };
 
 /// If the integrator traces light, render() adds a pass "light" to those of the last phase; it advances with them, and
-/// its film is added to the image (light_plan.h). Phases and estimate() only see the passes of camera samples.
+/// its film is added to the image (light_plan.h). Phases and the method only see the passes of camera samples.
 struct Plan {
-  std::shared_ptr<const Estimator> estimator;  ///< what the plan renders for
+  std::shared_ptr<const Method> method;  ///< what the plan renders for
   std::vector<Phase> phases;
-  /// Computes rows first_row … first_row + n_rows - 1 of the image from the current films. Its cost depends on the
-  /// size, not on sample counts.
-  std::function<EstimatorResult(std::span<const Pass>, int first_row, int n_rows, const Beside& beside)> estimate;
-  bool takes_unfinished = false;  ///< estimate() works even if some pixels have no samples yet
+  bool adds_films = false;        ///< the method gets the sum of both passes' films (denoised_passes.h)
+  bool takes_unfinished = false;  ///< the method works even if some pixels have no samples yet
   bool takes_training = false;    ///< the integrator's training samples are part of the image
   bool has_crn_pass = false;      ///< some pass uses common random numbers
   bool traces_light = false;      ///< set by render(): there is a light pass
   /// With a time limit, the speed is measured before the passes begin, so that there are no more groups than samples.
   bool groups_follow_speed = false;
 
-  /// The film of the only pass is the result; estimate() only provides its error.
-  bool film_is_image() const { return phases.size() == 1 && estimator->image_is_film(); }
+  /// The film of the only pass holds the image, and is what the output's file is made of: one can add samples to it.
+  bool makes_film() const { return phases.size() == 1 && method->film_holds_image(); }
 };
+
+/// Rows first_row … first_row + n_rows - 1 of the image, from the current films of the camera's passes. Its cost
+/// depends on the size, not on sample counts.
+MethodImage image_of(const Plan& plan, std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside);
 
 /// The passes without the light pass, which is the last if there is one.
 std::span<const Pass> camera_passes(std::span<const Pass> passes);

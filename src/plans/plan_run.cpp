@@ -64,8 +64,7 @@ RenderResult PlanRun::run() {
   try {
     result_.interrupted = !render_to_limits();
     result_.complete = complete() && (!in_rounds() || state_.budget >= largest_budget(scene_, request_));
-    if (result_.interrupted && can_estimate() && !request_.films_only &&
-        (!plan_.film_is_image() || film_has_errors())) {
+    if (result_.interrupted && can_estimate() && needs_estimate()) {
       keep_films_before_more();
       estimate();
     }
@@ -288,7 +287,7 @@ Pass PlanRun::begin_pass(const PassPlan& plan) {
   pass.film.attributes.insert_or_assign(film_key::kComplete, "false");
   if (plan.light) pass.film.attributes.insert_or_assign(film_key::kLightPaths, std::to_string(kBundlePaths));
   if (!plan.estimator.empty()) pass.film.attributes.insert_or_assign("estimator", plan.estimator);
-  take_film_on_disk(plan_, request_, callbacks_.warning, pass);
+  take_film_on_disk(request_, callbacks_.warning, pass);
   result_.seconds.processor += pass.processor_seconds;  // of earlier calls
   if (const auto budgets = pass.film.attributes.find(film_key::kBudgets); budgets != pass.film.attributes.end())
     rounds_.take(budgets->second, largest_budget(scene_, request_), pass.path);

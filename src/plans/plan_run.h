@@ -86,19 +86,15 @@ class PlanRun {
   double error_to_limit() const {
     return request_.until_in_blocks ? result_.predicted_blocks : result_.predicted->relmse;
   }
-  /// The film is the image, and its groups give its error.
-  bool film_has_errors() const {
-    return !request_.films_only && plan_.film_is_image() && plan_.estimator->predicts_error &&
-           state_.passes[0].film.groups() > 1;
-  }
-  /// The film needs no estimate, except for its error or layers.
+  /// A film that is the image needs no estimate, except for its error, which its groups tell, or for layers.
   bool needs_estimate() const {
     if (request_.films_only) return false;
-    return !plan_.film_is_image() || film_has_errors() || request_.until > 0 || request_.splits_layers();
+    const bool has_error = plan_.method->predicts_error && state_.passes[0].film.groups() > 1;
+    return !plan_.makes_film() || has_error || request_.until > 0 || request_.splits_layers();
   }
   /// Guides of the whole window; empty if the plan reads none or they do not exist.
-  Guides guides() const { return plan_.estimator->reads_guides ? guides_among(result_.aovs) : Guides(); }
-  bool needs_aovs() const { return request_.aovs || plan_.estimator->reads_guides; }
+  Guides guides() const { return plan_.method->reads_guides ? guides_among(result_.aovs) : Guides(); }
+  bool needs_aovs() const { return request_.aovs || plan_.method->reads_guides; }
   bool stopped() const { return callbacks_.stop && callbacks_.stop->load(); }
   /// The passes of every phase exist.
   bool all_begun() const {

@@ -41,10 +41,10 @@ EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows, std::span<cons
     if (*guide) images[i] = rows_of(**guide, first_row, n_rows), *guide = &images[i++];
   for (size_t i = 0; i < layers.size(); ++i)
     beside.layers.push_back({layer_names_[i], rows_of(layers[i], first_row, n_rows)});
-  EstimatorResult image = plan_.estimate(camera_passes(state_.passes), first_row, n_rows, beside);
   const Pass* light = light_pass(state_.passes);
   const GroupedImage light_rows = light ? rows_of(light->film, first_row, n_rows) : GroupedImage{};
-  finish(image, light ? &light_rows : nullptr);
+  EstimatorResult image =
+      finish(image_of(plan_, camera_passes(state_.passes), first_row, n_rows, beside), light ? &light_rows : nullptr);
   if (has_training()) add_training(state_.passes[0].film, result_.training, first_row, image);
   return image;
 }
@@ -76,12 +76,12 @@ bool PlanRun::estimate() {
     if (!image.kept_samples[i].data.empty()) result_.aovs[kKeptSamples[i]] = std::move(image.kept_samples[i]);
   double samples = 0;
   for (const Pass& pass : camera_passes(films())) samples += pass.film.mean_count();
-  result_.predicted = predicted_error(image, samples, plan_.estimator->reliable_samples);
+  result_.predicted = predicted_error(image, samples, plan_.method->reliable_samples);
   if (result_.predicted) result_.predicted_blocks = predicted_blocks(image);
   if (request_.until > 0 && !result_.predicted)
     throw Error(ErrorCode::kUsage, "an error can only be predicted from 2 or more groups");
   if (callbacks_.estimated) callbacks_.estimated(image, result_.predicted);
-  if (plan_.film_is_image()) image.estimate = {};
+  if (plan_.makes_film()) image.estimate = {};
   result_.image = std::move(image);
   estimate_seconds_ = watch.seconds();
   result_.seconds.estimate += *estimate_seconds_;
@@ -148,7 +148,7 @@ void PlanRun::keep_films_of_failure() noexcept {
   try {
     if (try_to_keep_films(false, "they are lost") && callbacks_.warning)
       callbacks_.warning(
-          output_is_film(plan_, request_)
+          is_output(films()[0], request_)
               ? fmt::format("the film is kept in '{}'; `resume` continues it", request_.output)
               : fmt::format("the films are kept in '{}'; `resume` continues them", passes_folder(request_).string()));
   } catch (...) {  // no memory for the warning's text
@@ -157,11 +157,11 @@ void PlanRun::keep_films_of_failure() noexcept {
 
 void PlanRun::write_files() {
   begin(RenderStage::kWriting);
-  const bool is_film = output_is_film(plan_, request_);
   result_.integrator = state_.integrator;
   result_.passes = std::move(state_.passes);
   if (result_.interrupted && result_.samples_per_pixel() == 0) return;
-  if (plan_.film_is_image() && has_training())
+  const bool is_film = is_output(result_.passes[0], request_);
+  if (plan_.makes_film() && has_training())
     result_.image.estimate = with_training(result_.passes[0].film, result_.training);
   if (request_.path_lengths && !result_.interrupted) {
     keep_films_before_more();

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "combine/registry.h"
 #include "core/error.h"
 #include "core/processor_time.h"
 #include "passes/sample_parts.h"
@@ -33,18 +34,17 @@ void check(const LoadedScene& scene, const Plan& plan, const RenderRequest& requ
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   if (request.spp && (*request.spp < 1 || *request.spp > kMaxBudget))
     usage(fmt::format("{} samples per pixel; expected 1 to {}", *request.spp, kMaxBudget));
-  if (plan.estimator->passes == EstimatorPasses::kSamples && (request.seconds > 0 || request.until > 0))
-    usage(plan.estimator->name +
-          " must know the number of samples in advance, so time and error limits are impossible");
+  if (plan.method->pixel_pass() && (request.seconds > 0 || request.until > 0))
+    usage(plan.method->name + " must know the number of samples in advance, so time and error limits are impossible");
   if (request.path_lengths && !integrator_of(scene).longest_path())
     usage("an image for each path length needs an integrator that supports it, such as controlled-path");
-  if (request.splits_layers() && !plan.estimator->splits_layers)
-    usage(plan.estimator->name + " makes no `layers`; `estimator` none does, denoised or not");
+  if (request.splits_layers() && !plan.method->splits_layers())
+    usage(fmt::format("{} makes no `layers`; `estimator` {} does, denoised or not", plan.method->name, kNoEstimator));
   if (request.light_groups) check_light_groups(scene);
   if (request.layers && !integrator_of(scene).of_direct_light())
     usage("`layers` direct needs an integrator that separates direct from indirect light: path");
-  if (request.until > 0 && (request.films_only || !plan.estimator->predicts_error))
-    usage((request.films_only ? "a render of films alone" : plan.estimator->name) + " does not estimate its error");
+  if (request.until > 0 && (request.films_only || !plan.method->predicts_error))
+    usage((request.films_only ? "a render of films alone" : plan.method->name) + " does not estimate its error");
 }
 
 }  // namespace

@@ -2,12 +2,12 @@
 #include "plans/render_settings.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
 #include "core/error.h"
 #include "core/number_text.h"
-#include "estimators/iicv.h"
 #include "integrators/registry.h"
 #include "passes/light_pass.h"
 #include "passes/training.h"
@@ -43,7 +43,8 @@ void declare_passes(Settings& s, PassChoice& v) {
                                                                     {"crn", Sampling::kCrn}};
   s.group("Sampling", OptionEffect::kPasses);
   s.choice("sampling", v.sampling, kSamplings,
-           "Random numbers of a single pass (`estimator` none): independent, or common to all pixels",
+           fmt::format("Random numbers of a single pass (`estimator` {}): independent, or common to all pixels",
+                       kNoEstimator),
            {.effect = OptionEffect::kSamples});
   s.text_as("split", v, "CRN:INDEPENDENT", read_split,
             "Ratio of the samples of the two passes; default: the estimator's, usually 1:1");
@@ -91,7 +92,9 @@ void declare(Settings& s, RenderSettings& v) {
   s.one_of("integrator", v.integrator, integrator_names(), "Integrator instead of the scene's", kBasicSamples);
   if (s.is_given("sampling")) v.estimator = kNoEstimator;
   s.one_of("estimator", v.estimator, estimator_names(),
-           "How samples become the image; none: their mean. Others than the default are denoised only by `denoise`",
+           fmt::format(
+               "How samples become the image; {}: their mean. Others than the default are denoised only by `denoise`",
+               kNoEstimator),
            kBasicPasses);
   v.denoising.mode = usual_denoising(v.estimator);
   declare(s, v.denoising, false);
@@ -103,15 +106,42 @@ void declare(Settings& s, RenderSettings& v) {
   declare(s, v.request);
 }
 
-Estimator estimator_of(const RenderSettings& settings, const OptionValues& of_estimator) {
-  Estimator estimator = with_denoising(make_estimator(settings.estimator, of_estimator), settings.denoising);
+Method estimator_of(const RenderSettings& settings, const OptionValues& of_estimator) {
+  Method estimator = with_denoising(make_estimator(settings.estimator, of_estimator), settings.denoising);
   if (!settings.request.relative_error) return estimator;
   if (!estimator.adaptive)
     throw Error(ErrorCode::kUsage,
-                "`until` relative needs adaptive sample counts: `adaptive`, or `estimator` "
-                "dependent-tests");
+                fmt::format("`until` relative needs adaptive sample counts: `adaptive`, or `estimator` {}",
+                            fmt::join(estimators_where([](const Method& e) { return e.adaptive.has_value(); }), ", ")));
   estimator.adaptive->counts.relative_error = settings.request.relative_error;
   return estimator;
+}
+
+void check_given(const OptionValues& given, const RenderSettings& settings, const Method& method) {
+  const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
+  const auto has = [&](const char* option) { return given.contains(option); };
+  const std::string& name = settings.estimator;
+  const bool is_pair = method.pair(), of_pixels = method.pixel_pass();
+  if (method.one_pass() && !method.is_mean() && settings.passes.sampling == Sampling::kCrn)
+    usage(
+        "`denoise` of a single pass needs `sampling` independent: errors that all pixels share show in no difference");
+  if (has("sampling") && !method.one_pass())
+    usage(fmt::format(
+        "`sampling` is an option of `estimator` {}; {} renders one pass {}", kNoEstimator, name,
+        of_pixels ? "with independent random numbers" : "with common random numbers and one with independent ones"));
+  if (method.adaptive && has("split"))
+    usage(fmt::format("`split`: the first pass of {} has its own number of samples, `dependent-spp`", name));
+  if (method.adaptive && has("sampling")) usage("`sampling`: `adaptive` always takes independent random numbers");
+  if (!is_pair && has("split")) usage("`split` is an option of estimators with two passes, not of " + name);
+  if (of_pixels && has("groups"))
+    usage(fmt::format("`groups`: {} are fitted to the samples of a pixel themselves, not to means of groups", name));
+  if (of_pixels && has("time"))
+    usage(fmt::format(
+        "`time`: {} are fitted to all samples of a pixel together, so their number must be known; use `spp`", name));
+  if (settings.request.until <= 0) return;
+  if (!method.predicts_error)
+    usage("`until`: " + name + " does not estimate its error" + (method.adaptive ? "; use relative=X" : ""));
+  if (method.is_mean() && settings.passes.groups.value_or(2) < 2) usage("`until` needs `groups` 2 or more");
 }
 
 Plan render_plan(const RenderSettings& settings, const OptionValues& of_estimator) {
@@ -132,18 +162,18 @@ RenderRequest request_of(const RenderSettings& settings, const LoadedScene& scen
   return request;
 }
 
-std::string advice(const RenderSettings& settings, const Estimator& estimator, const LoadedScene& scene) {
+std::string advice(const RenderSettings& settings, const Method& estimator, const LoadedScene& scene) {
   const RenderRequest& request = settings.request;
   if (request.seconds > 0 || request.until > 0 || request.films_only) return "";
   const uint32_t samples = request.spp.value_or(static_cast<uint32_t>(scene.spp));
   if (samples >= kFewSamples) return "";
   const std::string& mode = settings.denoising.mode;
-  if (estimator.passes == EstimatorPasses::kIndependent && (mode == "balanced" || mode == "bias"))
+  if (estimator.one_pass() && lowers_bias(denoise_mode(mode)))
     return fmt::format(
         "around {} independent samples per pixel, `denoise` {} is nearly the same as auto; for less bias take {} or "
-        "more, or `estimator` iicv with `denoise` {}",
-        samples, mode, kFewSamples, mode);
-  if (estimator.passes != EstimatorPasses::kPair || samples >= estimator.reliable_samples) return "";
+        "more, or `estimator` {} with `denoise` {}",
+        samples, mode, kFewSamples, kDefaultOfPairs, mode);
+  if (!estimator.pair() || samples >= estimator.reliable_samples) return "";
   return fmt::format("with {} samples per pixel, `estimator` {} is {}; take {} or more, or leave `estimator` out",
                      samples, settings.estimator, mode == DenoisingChoice::kNone ? "blotchy" : "worse than the default",
                      estimator.reliable_samples);
@@ -191,7 +221,7 @@ std::vector<std::string> replay_words(OptionValues values, const Pass& pass, con
 std::vector<std::string> pass_words(OptionValues given, const OptionValues& of_integrator, OptionValues of_estimator) {
   const RenderSettings settings = settings_from<RenderSettings>(given);
   const std::string name = settings.estimator;
-  const Estimator estimator = make_estimator(name, of_estimator);
+  const Method estimator = make_estimator(name, of_estimator);
   given.erase("estimator");
   std::vector<std::string> words;
   const auto add = [&](const std::vector<Option>& options, OptionValues& values) {
@@ -203,8 +233,7 @@ std::vector<std::string> pass_words(OptionValues given, const OptionValues& of_i
   add(options_of<RenderSettings>(), given);
   add(options_of_estimator(name), of_estimator);
   for (const auto& [option, value] : of_integrator) words.insert(words.end(), {"--" + option, value});
-  const bool is_plain_pair = estimator.passes == EstimatorPasses::kPair && !estimator.adaptive;
-  const bool is_mean = estimator.passes == EstimatorPasses::kAny;
+  const bool is_plain_pair = estimator.pair() && !estimator.adaptive, is_mean = estimator.is_mean();
   const bool is_denoised_mean = is_mean && settings.denoising.denoises();
   words.push_back(is_plain_pair ? "pair" : is_denoised_mean ? "groups" : is_mean ? kNoEstimator : name.c_str());
   return words;

@@ -28,7 +28,10 @@ struct RenderSettings {
 void declare(Settings& settings, RenderSettings& render);
 
 /// The estimator with its options, denoised as the settings say. Throws Error(kUsage).
-Estimator estimator_of(const RenderSettings& settings, const OptionValues& of_estimator);
+Method estimator_of(const RenderSettings& settings, const OptionValues& of_estimator);
+
+/// Throws Error(kUsage) for options among `given` that the method does not have, whoever gives them.
+void check_given(const OptionValues& given, const RenderSettings& settings, const Method& method);
 
 /// The plan of that estimator, with the passes that the settings choose. Throws Error(kUsage).
 Plan render_plan(const RenderSettings& settings, const OptionValues& of_estimator);
@@ -40,7 +43,7 @@ RenderRequest request_of(const RenderSettings& settings, const LoadedScene& scen
 /// What to use instead where options do little for so many samples per pixel: `denoise` balanced or bias around the
 /// mean of few independent samples, a pair of passes with few samples. Empty if there is nothing to say, or the number
 /// is not known.
-std::string advice(const RenderSettings& settings, const Estimator& estimator, const LoadedScene& scene);
+std::string advice(const RenderSettings& settings, const Method& estimator, const LoadedScene& scene);
 
 /// Subtracts the samples of the integrator's training, if any, from those of the passes, if their number is known.
 /// Throws Error(kUsage) if none are left.

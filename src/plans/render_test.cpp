@@ -63,16 +63,14 @@ TEST(Render, AnEstimateThatTookLongUntilItWasStoppedIsNotMadeAgain) {
     std::atomic<bool> stop{false};
     RenderCallbacks callbacks;
     callbacks.stop = &stop;
-    Plan plan = average_plan();
     int n_estimates = 0;
-    plan.estimate = [&, wait = milliseconds, average = plan.estimate](std::span<const Pass> passes, int first, int n,
-                                                                      const Beside& beside) {
+    const Plan plan = with_image(average_plan(), [&, wait = milliseconds](const auto& average, const auto&) {
       if (++n_estimates == 1) {
         std::this_thread::sleep_for(std::chrono::milliseconds(wait));
         for (stop = true;; std::this_thread::yield()) throw_if_stopped();
       }
-      return average(passes, first, n, beside);
-    };
+      return average();
+    });
     const RenderResult result = render(scene, plan, request_of(24), callbacks);
     EXPECT_TRUE(result.interrupted);
     EXPECT_EQ(n_estimates, expected) << milliseconds;
@@ -290,12 +288,14 @@ std::vector<std::pair<uint32_t, int>> taken(const Plan& plan, const RenderReques
 
 TEST(Budget, IsTakenToTheSample) {
   using Taken = std::vector<std::pair<uint32_t, int>>;
-  Estimator method;
+  Method method;
   PassChoice choice;
-  method.name = "average", method.fewest_groups = 3,
-  method.apply = [](const GroupedImage&, const GroupedImage&, const PairSettings&) {
+  method.name = "average", method.fewest_groups = 3;
+  PassPair passes;
+  passes.image = [](const GroupedImage&, const GroupedImage&, const MethodSettings&) {
     return EstimatorResult{.estimate = Image(3, 2, 3)};
   };
+  method.passes = passes;
   const auto pair = [&](uint32_t spp) { return taken(pair_plan(method, choice), request_of(spp)); };
   EXPECT_EQ(pair(192), (Taken{{96, 12}, {96, 12}}));
   EXPECT_EQ(pair(96), (Taken{{48, 12}, {48, 12}}));

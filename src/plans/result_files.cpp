@@ -7,7 +7,6 @@
 #include <map>
 
 #include "combine/result_file.h"
-#include "estimators/mean.h"
 #include "film/exposure.h"
 #include "film/film_file.h"
 #include "film/image_writer.h"
@@ -15,6 +14,7 @@
 #include "plans/light_plan.h"
 #include "plans/made_of.h"
 #include "plans/pass_files.h"
+#include "risk/plain_mean.h"
 
 namespace covary {
 
@@ -29,7 +29,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
     for (const char* name : kAuxiliaryImages) aovs.erase(name);
   aovs.insert(request.beside.begin(), request.beside.end());
   Film& last = result.passes[camera_passes(result.passes).size() - 1].film;
-  if (plan.film_is_image()) {
+  if (plan.makes_film()) {
     const Pass* light = light_pass(result.passes);
     Film sum;
     if (light) sum = sum_of_films(last, light->film);
@@ -47,8 +47,8 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
                             film_key::kCommand, film_key::kMadeOf, film_key::kTimeChoice})
       if (film.attributes.count(key)) attributes[std::string("covary:") + key] = film.attributes.at(key);
     const bool estimated = !result.image.estimate.data.empty();
-    attributes["covary:estimator"] = estimated ? plan.estimator->text : kMeanName;
-    if (estimated && !plan.estimator->network.empty()) attributes["covary:denoiser"] = plan.estimator->network;
+    attributes["covary:estimator"] = estimated ? plan.method->text : kMeanName;
+    if (estimated && !plan.method->network.empty()) attributes["covary:denoiser"] = plan.method->network;
     if (result.interrupted) attributes[std::string("covary:") + film_key::kComplete] = "false";
     attributes["covary:samples"] = fmt::format("{:g}", result.samples_per_pixel());
     if (aovs.contains("Albedo")) attributes[std::string("covary:") + film_key::kCleanGuides] = "true";

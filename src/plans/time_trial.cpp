@@ -76,13 +76,10 @@ double PlanRun::end_of_band(int n_rows, std::span<const PassPlan> plans) {
   if (needs_aovs())
     for (const char* name : kAuxiliaryImages) result.aovs[name] = made_up_image(band.width, n_rows);
   Beside beside;
-  if (plan_.estimator->reads_guides) beside.guides = guides_among(result.aovs);
+  if (plan_.method->reads_guides) beside.guides = guides_among(result.aovs);
   const Stopwatch watch;
-  if (!plan_.film_is_image() && !request_.films_only)
-    run_stoppable(callbacks_.stop, [&] {
-      result.image = plan_.estimate(result.passes, 0, n_rows, beside);
-      finish(result.image, nullptr);
-    });
+  if (!plan_.makes_film() && !request_.films_only)
+    run_stoppable(callbacks_.stop, [&] { result.image = finish(image_of(plan_, result.passes, 0, n_rows, beside)); });
   if (stopped() || request_.output.empty()) return watch.seconds();
   RenderRequest request = request_;
   request.output = trial_file(request_.output), request.beside.clear();

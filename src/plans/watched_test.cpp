@@ -99,13 +99,12 @@ TEST(Watched, AStopWaitsForTheWholeImageIfAsked) {
     callbacks.stop = &stop, callbacks.whole_image = &whole_image;
     int waves = 0;
     callbacks.wave = [&](std::span<const Pass>) { stop = ++waves >= 2; };
-    Plan plan = average_plan();
-    plan.estimate = [average = plan.estimate](std::span<const Pass> passes, int first, int n, const Beside& beside) {
+    const Plan plan = with_image(average_plan(), [](const auto& average, const auto&) {
       std::this_thread::sleep_for(std::chrono::milliseconds(700));
-      EstimatorResult result = average(passes, first, n, beside);
+      EstimatorResult result = average();
       parallel_for(1, [](int) {});  // where it would be stopped
       return result;
-    };
+    });
     const RenderResult result = render(scene, plan, request_of(1024), callbacks);
     EXPECT_TRUE(result.interrupted);
     EXPECT_EQ(result.image.estimate.data.empty(), !whole);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "risk/error_interval_table.h"
 #include "risk/image_risk.h"
@@ -150,25 +151,26 @@ void take_fireflies(EstimatorResult& result) {
 
 }  // namespace
 
-void apply_interval(EstimatorResult& result) {
-  if (result.risk_rows.empty()) return;
-  RiskRow sums = sum_of(result.risk_rows);
-  result.risk_rows.clear();
+EstimatorResult with_error(MethodImage image) {
+  EstimatorResult& result = image;
+  if (image.risk_rows.empty()) return std::move(result);
+  RiskRow sums = sum_of(image.risk_rows);
   const double predicted = predicted_relmse(result);
   sums.predicted = predicted * sums.values;
   result.risk_sums = sums;
   if (!(predicted > 0 && sums.variance > 0 && sums.noise > 0 && std::isfinite(sums.error + sums.noise_squares))) {
     result.interval = ErrorInterval{1, 1, 1, "its samples do not differ"};
-    return;
+    return std::move(result);
   }
-  const LogError error = fitted_error(sums, result.risk_kind);
+  const LogError error = fitted_error(sums, image.risk_kind);
   const double middle = std::exp(error.middle) / predicted;
-  const bool scaled = result.risk_kind != ErrorKind::kMean;
+  const bool scaled = image.risk_kind != ErrorKind::kMean;
   if (scaled) scale(result.std_error, middle);
   if (result.risks) scale_candidates(*result.risks, middle, sums.variance / (sums.values * std::exp(error.middle)));
   result.interval = ErrorInterval{scaled ? 1 : middle, std::exp(error.low - error.middle),
-                                  std::exp(error.high - error.middle), unknown_error(sums, result.risk_kind, error)};
+                                  std::exp(error.high - error.middle), unknown_error(sums, image.risk_kind, error)};
   take_fireflies(result);
+  return std::move(result);
 }
 
 }  // namespace covary

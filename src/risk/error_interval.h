@@ -48,10 +48,9 @@ bool has_rare_light(const RiskRow& sums);
 /// Why no interval can be given; empty if one can.
 std::string unknown_error(const RiskRow& sums, ErrorKind kind, const LogError& error);
 
-/// Scales the standard error of `result` so that its relMSE is the middle of the interval (not for a mean, which is
-/// unbiased in every pixel), and by the same factor the errors of the candidates that it was mixed of, which are known
-/// relative to its own; sets `result.interval` and `result.risk_sums`. Empties `result.risk_rows`; does nothing if
-/// there are none.
-void apply_interval(EstimatorResult& result);
+/// The image with the error that its rows tell, if they tell one. The relMSE of the standard error is the middle of the
+/// interval (but not of a mean, which is unbiased in every pixel), and the errors of the candidates that it was mixed
+/// of are as large relative to it as they were.
+EstimatorResult with_error(MethodImage image);
 
 }  // namespace covary

@@ -27,8 +27,8 @@ RiskRow known_sums() {
   return s;
 }
 
-EstimatorResult result_of(const RiskRow& sums, ErrorKind kind) {
-  EstimatorResult result;
+MethodImage image_of(const RiskRow& sums, ErrorKind kind) {
+  MethodImage result;
   result.estimate = result.std_error = Image(4, 4, 3);
   std::fill(result.std_error.data.begin(), result.std_error.data.end(), 0.01f);
   result.risk_rows = {sums}, result.risk_kind = kind;
@@ -38,12 +38,10 @@ EstimatorResult result_of(const RiskRow& sums, ErrorKind kind) {
 TEST(ErrorInterval, IsAroundThePredictedError) {
   for (const ErrorKind kind :
        {ErrorKind::kPair, ErrorKind::kFilters, ErrorKind::kNetwork, ErrorKind::kPairFilters, ErrorKind::kPairNetwork}) {
-    EstimatorResult result = result_of(known_sums(), kind);
-    const double before = predicted_relmse(result);
-    apply_interval(result);
+    const double before = predicted_relmse(image_of(known_sums(), kind));
+    const EstimatorResult result = with_error(image_of(known_sums(), kind));
     ASSERT_TRUE(result.interval);
     EXPECT_EQ(result.interval->unknown, "");
-    EXPECT_TRUE(result.risk_rows.empty());
     const double middle = predicted_relmse(result);
     const PredictedBounds bounds = predicted_error(result, 64, 0)->bounds.value();
     EXPECT_LT(bounds.low, middle);
@@ -57,10 +55,10 @@ TEST(ErrorInterval, IsAroundThePredictedError) {
 /// Candidates are known relative to the mixture: what is said of the mixture is said of them, too, so that their order
 /// does not depend on the fit. The mean's error is its own.
 TEST(ErrorInterval, ScalesTheErrorsOfCandidatesLikeThatOfTheirMixture) {
-  EstimatorResult result = result_of(known_sums(), ErrorKind::kNetwork);
-  const double before = predicted_relmse(result);
-  result.risks = MeasuredRisks{before, 0.5, {{"mean", 0.03}, {"oidn", 1.2 * before}, {"sharp", 0.9 * before}}};
-  apply_interval(result);
+  MethodImage image = image_of(known_sums(), ErrorKind::kNetwork);
+  const double before = predicted_relmse(image);
+  image.risks = MeasuredRisks{before, 0.5, {{"mean", 0.03}, {"oidn", 1.2 * before}, {"sharp", 0.9 * before}}};
+  const EstimatorResult result = with_error(image);
   const double middle = predicted_relmse(result);
   EXPECT_GT(std::abs(middle / before - 1), 0.05) << "the fit changes it";
   EXPECT_EQ(result.risks->images[0].relmse, 0.03);
@@ -83,10 +81,10 @@ double middle_by_hand(const RiskRow& s, const ErrorFeatures& a, double part = 1)
 }
 
 TEST(ErrorInterval, OfAMeanLeavesItsStandardErrorAsItIs) {
-  EstimatorResult result = result_of(known_sums(), ErrorKind::kMean);
-  const std::vector<float> before = result.std_error.data;
-  const double predicted = predicted_relmse(result);
-  apply_interval(result);
+  const MethodImage image = image_of(known_sums(), ErrorKind::kMean);
+  const std::vector<float> before = image.std_error.data;
+  const double predicted = predicted_relmse(image);
+  const EstimatorResult result = with_error(image);
   EXPECT_EQ(result.std_error.data, before);
   const PredictedError error = predicted_error(result, 64, 0).value();
   RiskRow sums = known_sums();
@@ -100,8 +98,7 @@ TEST(ErrorInterval, OfAMeanLeavesItsStandardErrorAsItIs) {
 TEST(ErrorInterval, IsNotGivenWithFewGroups) {
   RiskRow sums = known_sums();
   sums.groups = 7;
-  EstimatorResult result = result_of(sums, ErrorKind::kPair);
-  apply_interval(result);
+  EstimatorResult result = with_error(image_of(sums, ErrorKind::kPair));
   EXPECT_EQ(result.interval->unknown, "7 groups of samples are too few; 8 are needed");
 }
 
@@ -152,8 +149,7 @@ TEST(ErrorInterval, OfAMixtureReachesToTheRiskThatSamplesTell) {
 TEST(ErrorInterval, IsNotGivenWhereFewPixelsHoldTheNoise) {
   RiskRow sums = known_sums();
   sums.noise_squares = sums.noise * sums.noise / 4;
-  EstimatorResult result = result_of(sums, ErrorKind::kNetwork);
-  apply_interval(result);
+  EstimatorResult result = with_error(image_of(sums, ErrorKind::kNetwork));
   EXPECT_EQ(result.interval->unknown, "4 of 10000 pixels hold most of the noise");
 }
 
@@ -171,8 +167,7 @@ TEST(ErrorInterval, IsWiderWhereFewerPixelsHoldTheNoise) {
 TEST(ErrorInterval, IsNotGivenWhereLightIsMissing) {
   RiskRow sums = known_sums();
   sums.light_of_largest = 0.9 * sums.light;
-  EstimatorResult result = result_of(sums, ErrorKind::kNetwork);
-  apply_interval(result);
+  EstimatorResult result = with_error(image_of(sums, ErrorKind::kNetwork));
   EXPECT_EQ(result.interval->unknown, "90 % of the light is in one of 12 groups of each pixel");
   EXPECT_FALSE(predicted_error(result, 64, 0)->bounds);
   EXPECT_EQ(predicted_error(result, 64, 0)->doubt,
@@ -191,22 +186,21 @@ TEST(ErrorInterval, IsNotGivenWhereMostNoiseIsBehindGlass) {
 }
 
 TEST(ErrorInterval, IsNotGivenOfBlackImages) {
-  EstimatorResult result = result_of({}, ErrorKind::kFilters);
-  apply_interval(result);
+  EstimatorResult result = with_error(image_of({}, ErrorKind::kFilters));
   EXPECT_EQ(result.interval->unknown, "its samples do not differ");
 }
 
 TEST(ErrorInterval, IsNotGivenWhereTheImageKeptFireflies) {
-  EstimatorResult result = result_of(known_sums(), ErrorKind::kNetwork);
-  result.estimate = result.std_error = Image(40, 25, 3);
-  std::fill(result.estimate.data.begin(), result.estimate.data.end(), 0.5f);
-  std::fill(result.std_error.data.begin(), result.std_error.data.end(), 0.02f);
-  EstimatorResult without = result;
+  MethodImage image = image_of(known_sums(), ErrorKind::kNetwork);
+  image.estimate = image.std_error = Image(40, 25, 3);
+  std::fill(image.estimate.data.begin(), image.estimate.data.end(), 0.5f);
+  std::fill(image.std_error.data.begin(), image.std_error.data.end(), 0.02f);
+  const EstimatorResult without = with_error(image);
   for (const int x : {10, 11}) {
-    std::fill_n(result.estimate.pixel(x, 10), 3, 15000.0f);
-    std::fill_n(result.std_error.pixel(x, 10), 3, 14000.0f);
+    std::fill_n(image.estimate.pixel(x, 10), 3, 15000.0f);
+    std::fill_n(image.std_error.pixel(x, 10), 3, 14000.0f);
   }
-  apply_interval(without), apply_interval(result);
+  const EstimatorResult result = with_error(image);
   EXPECT_EQ(without.interval->unknown, "");
   EXPECT_EQ(result.interval->unknown,
             "2 pixels are more than 10 times as bright as those around, by few samples: they may be fireflies");
@@ -219,18 +213,16 @@ TEST(ErrorInterval, IsNotGivenWhereTheImageKeptFireflies) {
 TEST(ErrorInterval, TheLightThatAFireflySpreadsCountsWhereFewPixelsHoldTheNoise) {
   RiskRow sums = known_sums();
   sums.spread = 100 * sums.values;
-  EstimatorResult result = result_of(sums, ErrorKind::kFilters);
-  apply_interval(result);
+  EstimatorResult result = with_error(image_of(sums, ErrorKind::kFilters));
   EXPECT_LT(predicted_error(result, 64, 0)->relmse, 1) << "noise in many pixels may be rare light";
   sums.noise_squares = sums.noise * sums.noise / 2;
-  result = result_of(sums, ErrorKind::kFilters);
-  apply_interval(result);
+  result = with_error(image_of(sums, ErrorKind::kFilters));
   EXPECT_EQ(result.interval->unknown, "2 of 10000 pixels hold most of the noise");
   EXPECT_NEAR(predicted_error(result, 64, 0)->relmse, 100, 1e-3);
 }
 
 TEST(ErrorInterval, IsNotReliableBeyondAFactorOfOneAndAHalf) {
-  EstimatorResult result = result_of(known_sums(), ErrorKind::kFilters);
+  EstimatorResult result = image_of(known_sums(), ErrorKind::kFilters);
   result.interval = ErrorInterval{1, 0.7, 1.49, ""};
   EXPECT_EQ(predicted_error(result, 64, 0)->doubt, "");
   result.interval = ErrorInterval{1, 0.7, 1.6, ""};

@@ -97,41 +97,42 @@ TEST(HeldOutBias, LeavesOutWhatIsNotValid) {
 TEST(HeldOutBias, IsToldByEstimatorsAndDoesNotDependOnThreads) {
   const test::Grouped crn = test::crn_image(kWidth, kHeight, 8, 1),
                       independent = test::independent_image(kWidth, kHeight, 8, 1);
-  PairSettings settings;
+  MethodSettings settings;
   settings.std_error = true;
   MixedDenoisingOptions options;
   options.mode = DenoiseMode::kError;
   options.use_oidn = false;
-  for (const Estimator& estimator : {make_estimator("iicv"), with_denoising(make_estimator("iicv"), options)}) {
+  for (const Method& estimator : {make_estimator("iicv"), with_denoising(make_estimator("iicv"), options)}) {
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-    const EstimatorResult alone = estimator.apply(crn.view(), independent.view(), settings);
+    const EstimatorResult alone = estimator.image({crn.view(), independent.view()}, settings);
     const tbb::global_control four(tbb::global_control::max_allowed_parallelism, 4);
-    const EstimatorResult together = estimator.apply(crn.view(), independent.view(), settings);
+    const EstimatorResult together = estimator.image({crn.view(), independent.view()}, settings);
     ASSERT_EQ(alone.bias.data.size(), alone.estimate.data.size()) << estimator.text;
     EXPECT_EQ(alone.bias.data, together.bias.data) << estimator.text;
   }
   settings.std_error = false;
-  EXPECT_TRUE(make_estimator("iicv").apply(crn.view(), independent.view(), settings).bias.data.empty());
+  EXPECT_TRUE(make_estimator("iicv").image({crn.view(), independent.view()}, settings).bias.data.empty());
 }
 
 /// `iicv` with a modified image.
-Estimator damaged(const std::function<Image(const Image&)>& damage) {
-  Estimator estimator = make_estimator("iicv");
-  const auto apply = estimator.apply;
-  estimator.apply = [apply, damage](const GroupedImage& g, const GroupedImage& h, const PairSettings& settings) {
-    EstimatorResult result = apply(g, h, settings);
+Method damaged(const std::function<Image(const Image&)>& damage) {
+  Method estimator = make_estimator("iicv");
+  PassPair& pair = std::get<PassPair>(estimator.passes);
+  pair.image = [image = pair.image, damage](const GroupedImage& g, const GroupedImage& h,
+                                            const MethodSettings& settings) {
+    EstimatorResult result = image(g, h, settings);
     result.estimate = damage(result.estimate);
     return result;
   };
   return with_held_out_rows(estimator);
 }
 
-Image bias_of(const Estimator& estimator) {
+Image bias_of(const Method& estimator) {
   const test::Grouped crn = test::noisy_image(kWidth, kHeight, 12, 5, 0.2f, 0);
   const test::Grouped independent = test::noisy_image(kWidth, kHeight, 12, 1005, 1.0f, 0);
-  PairSettings settings;
+  MethodSettings settings;
   settings.std_error = true;
-  return estimator.apply(crn.view(), independent.view(), settings).bias;
+  return estimator.image({crn.view(), independent.view()}, settings).bias;
 }
 
 TEST(HeldOutBias, ShowsAShiftedAndABlurredImage) {

@@ -28,7 +28,7 @@ constexpr double kLeastOverVariance = 0.25;
 HeldOutRow sum_of(const std::vector<HeldOutRow>& rows) {
   HeldOutRow all;
   for (const HeldOutRow& row : rows) {
-    all.error += row.error, all.variance += row.variance, all.predicted += row.predicted;
+    all.error += row.error, all.variance += row.variance;
     all.squares += row.squares, all.parts += row.parts;
   }
   return all;
@@ -49,21 +49,20 @@ double error_of_whole(const HeldOutRow& all) {
   return std::max(all.error - 0.5 * all.variance, kLeastOverVariance * all.variance);
 }
 
-/// Squared errors and variance of the halves in a row; weights_at(x): those of both halves' squared errors.
-template <typename WeightsAt>
-HeldOutRow row_of_halves(const HeldOutInput& in, int width, int y, const WeightsAt& weights_at) {
+/// Squared errors and variance of the halves in a row.
+HeldOutRow row_of_halves(const HeldOutInput& in, int width, int y) {
   HeldOutRow row;
   double part = 0;
   for (int x = 0; x < width; ++x) {
     if ((*in.valid)[static_cast<size_t>(y) * width + x]) {
       const float* m[2] = {in.halves[0]->pixel(x, y), in.halves[1]->pixel(x, y)};
-      const std::array<double, 2> weights = weights_at(x);
+      const double weight = relative_weight(in.guide->pixel(x, y));
       for (int c = 0; c < 3; ++c) {
         for (int half : {0, 1}) {
           const Moments& h = *in.independent[1 - half];
-          part += 0.5 * weights[half] * (square(h.mean.row(c, y)[x] - m[half][c]) - h.variance_of_mean.row(c, y)[x]);
+          part += 0.5 * weight * (square(h.mean.row(c, y)[x] - m[half][c]) - h.variance_of_mean.row(c, y)[x]);
         }
-        row.variance += 0.25 * (weights[0] + weights[1]) * square(m[0][c] - m[1][c]);
+        row.variance += 0.5 * weight * square(m[0][c] - m[1][c]);
       }
     }
     if (x % kPart != kPart - 1 && x != width - 1) continue;
@@ -103,28 +102,13 @@ double place(const Image& disagreement, const Image& weights, Image& std_error) 
   return after > 0 ? before / after : 1;
 }
 
-/// Each squared error is weighted by the image it belongs to, which is independent of the held-out samples.
-HeldOutRow held_out_row(const HeldOutInput& in, const EstimatorResult& whole, int y) {
-  const int width = whole.estimate.width;
-  HeldOutRow row = row_of_halves(in, width, y, [&](int x) {
-    return std::array<double, 2>{relative_weight(in.halves[0]->pixel(x, y)),
-                                 relative_weight(in.halves[1]->pixel(x, y))};
-  });
-  for (int x = 0; x < width; ++x) {
-    if (!(*in.valid)[static_cast<size_t>(y) * width + x]) continue;
-    const double w = relative_weight(whole.estimate.pixel(x, y));
-    for (int c = 0; c < 3; ++c) row.predicted += w * square(whole.std_error.pixel(x, y)[c]);
-  }
-  return row;
-}
-
-EstimatorResult apply_with_rows(const Estimator& base, const GroupedImage& crn, const GroupedImage& independent,
-                                const PairSettings& settings) {
-  EstimatorResult whole = base.apply(crn, independent, settings);
+MethodImage image_with_rows(const Method& base, const GroupedImage& crn, const GroupedImage& independent,
+                            const MethodSettings& settings) {
+  MethodImage whole = base.image({crn, independent}, settings);
   if (!settings.std_error || !settings.held_out || crn.groups < 2 * base.fewest_groups ||
       independent.groups < 2 * base.fewest_groups)
     return whole;
-  PairSettings half_settings = settings;
+  MethodSettings half_settings = settings;
   half_settings.std_error = false;
   half_settings.crn_samples = std::max<int64_t>(1, settings.crn_samples / 2);
   long ignored = 0;
@@ -133,7 +117,7 @@ EstimatorResult apply_with_rows(const Estimator& base, const GroupedImage& crn, 
   std::array<Moments, 2> h;
   for (int half : {0, 1}) {
     const HalfImage half_crn(crn, half), half_independent(independent, half);
-    images[half] = base.apply(half_crn.view(), half_independent.view(), half_settings).estimate;
+    images[half] = base.image({half_crn.view(), half_independent.view()}, half_settings).estimate;
     h[half] = moments(half_independent.view(), valid, 0, 0.0f);
   }
   const HeldOutInput input{{&images[0], &images[1]}, {&h[0], &h[1]}, nullptr, &valid};
@@ -142,47 +126,30 @@ EstimatorResult apply_with_rows(const Estimator& base, const GroupedImage& crn, 
       image_risk({&whole.estimate, input.halves, &all, input.independent, &independent, &whole.estimate, &valid});
   whole.risk_kind = ErrorKind::kPair;
   whole.bias = held_out_bias({input.halves, input.halves, input.independent, &valid});
-  whole.held_out.resize(static_cast<size_t>(crn.height));
-  parallel_for(crn.height, 8, [&](int y) { whole.held_out[static_cast<size_t>(y)] = held_out_row(input, whole, y); });
   return whole;
 }
 
 }  // namespace
 
-Estimator with_held_out_rows(const Estimator& base) {
+Method with_held_out_rows(const Method& base) {
   if (!base.holds_out || base.adaptive) return base;
-  Estimator estimator = base;
+  Method method = base;
   // The images and moments of both halves, the moments of all samples, and half of the groups of both images.
-  estimator.memory.of_halves = (2 * (3 + 6) + 6) * sizeof(float);
-  estimator.memory.of_halves_per_group = 3 * sizeof(float);
-  estimator.memory.groups_for_halves = 2 * base.fewest_groups;
-  if (base.reach >= 0) estimator.reach += kBiasReach;
-  estimator.apply = [base](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
-    return apply_with_rows(base, crn, independent, settings);
+  method.memory.of_halves = (2 * (3 + 6) + 6) * sizeof(float);
+  method.memory.of_halves_per_group = 3 * sizeof(float);
+  method.memory.groups_for_halves = 2 * base.fewest_groups;
+  if (base.reach >= 0) method.reach += kBiasReach;
+  std::get<PassPair>(method.passes).image = [base](const GroupedImage& crn, const GroupedImage& independent,
+                                                   const MethodSettings& settings) {
+    return image_with_rows(base, crn, independent, settings);
   };
-  return estimator;
-}
-
-void calibrate(EstimatorResult& result) {
-  if (result.held_out.empty()) return;
-  const HeldOutRow all = sum_of(result.held_out);
-  result.held_out.clear();
-  if (!(all.predicted > 0)) return;
-  const double trust = trust_in(all);
-  result.verdict = {std::sqrt(squared_uncertainty(all)), error_of_whole(all) / all.predicted};
-  if (trust == 0) return;
-  const auto factor = static_cast<float>(std::pow(error_of_whole(all) / all.predicted, 0.5 * trust));
-  for (float& value : result.std_error.data) value *= factor;
+  return method;
 }
 
 std::vector<HeldOutRow> held_out_rows(const HeldOutInput& in) {
   std::vector<HeldOutRow> rows(static_cast<size_t>(in.guide->height));
-  parallel_for(in.guide->height, 8, [&](int y) {
-    rows[static_cast<size_t>(y)] = row_of_halves(in, in.guide->width, y, [&](int x) {
-      const double weight = relative_weight(in.guide->pixel(x, y));
-      return std::array{weight, weight};
-    });
-  });
+  parallel_for(in.guide->height, 8,
+               [&](int y) { rows[static_cast<size_t>(y)] = row_of_halves(in, in.guide->width, y); });
   return rows;
 }
 

@@ -14,10 +14,19 @@
 #include <array>
 #include <vector>
 
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 #include "filters/planes.h"
 
 namespace covary {
+
+/// What held-out samples tell of the error of a row of pixels, relative as in relMSE: sums over its values, each
+/// divided by G'^2 + 0.01.
+struct HeldOutRow {
+  double error = 0;     ///< squared error of images made from half of the samples
+  double variance = 0;  ///< its variance part
+  double squares = 0;   ///< sum of squared `error` of the `parts` segments of the row
+  int parts = 0;
+};
 
 struct HeldOutInput {
   std::array<const Image*, 2> halves = {};            ///< M_A, M_B
@@ -31,7 +40,7 @@ struct HeldOutParts {
   /// The standard error as far as halves show where it is, up to a factor that is the same for all pixels.
   Image relative;
   Image weight;                  ///< of squared errors: 1 / (G'^2 + 0.01), one channel
-  std::vector<HeldOutRow> rows;  ///< sums over each row, without `predicted`
+  std::vector<HeldOutRow> rows;  ///< sums over each row
 };
 /// Radius of influence of the input on a pixel, in rows. Cells are aligned to multiples of kResidualCell.
 inline constexpr int kHeldOutReach = 32;
@@ -51,20 +60,14 @@ struct HalvesRisk {
   /// Of the image of all samples: the bias of a half, and half of its variance.
   double of_whole() const { return error - 0.5 * variance; }
 };
-/// The sums over each row, without `predicted`, with the weights of the guide.
+/// The sums over each row, with the weights of the guide.
 std::vector<HeldOutRow> held_out_rows(const HeldOutInput& input);
 /// Differences between images of the same halves are less noisy than the errors, because the held-out samples are the
 /// same.
 HalvesRisk risk_of_halves(const std::vector<HeldOutRow>& rows, double n_valid_pixels);
 
-/// An estimator that also fills EstimatorResult::held_out and risk_rows if both halves have enough groups; only for
-/// estimators with Estimator::holds_out, others are returned unchanged.
-Estimator with_held_out_rows(const Estimator& base);
-
-/// Scales the standard error so that its relMSE lies between the estimator's prediction and the held-out estimate: with
-/// the relative standard error c of the latter, the logarithm of their ratio has the weight 1 / (1 + (c / 0.3)^2).
-/// Held-out samples see bias, but few of them may have missed rare light. Empties `result.held_out` and fills
-/// `result.verdict`; does nothing if it is empty.
-void calibrate(EstimatorResult& result);
+/// A method that also tells the error and the bias of its image from both halves of the samples, if they have enough
+/// groups. Only for methods with Method::holds_out; others are returned unchanged.
+Method with_held_out_rows(const Method& base);
 
 }  // namespace covary

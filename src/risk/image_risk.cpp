@@ -158,7 +158,7 @@ std::vector<RiskRow> image_risk(const ImageRiskInput& input) {
   return rows;
 }
 
-void add_risk_of_mean(const GroupedImage& groups, EstimatorResult& mean) {
+void add_risk_of_mean(const GroupedImage& groups, MethodImage& mean) {
   if (groups.groups < 2) return;
   long ignored = 0;  // counted where the image is shown
   const std::vector<unsigned char> valid = finite_pixels(groups, groups, ignored);

@@ -19,7 +19,7 @@
 #include <array>
 #include <vector>
 
-#include "estimators/estimator.h"
+#include "estimators/method.h"
 #include "filters/planes.h"
 
 namespace covary {
@@ -41,7 +41,7 @@ std::vector<RiskRow> image_risk(const ImageRiskInput& input);
 
 /// Sets the rows and kind of `mean`, the mean of these groups with their standard error; does nothing if pixels have
 /// one group.
-void add_risk_of_mean(const GroupedImage& groups, EstimatorResult& mean);
+void add_risk_of_mean(const GroupedImage& groups, MethodImage& mean);
 
 /// Sums over all rows.
 RiskRow sum_of(const std::vector<RiskRow>& rows);

@@ -143,7 +143,7 @@ TEST(ImageRisk, TellsTheNoiseInMirrorsAndBehindGlass) {
 
 /// For the mean itself.
 std::vector<RiskRow> risk_of_mean(const GroupedImage& groups) {
-  EstimatorResult mean = mean_of_groups(groups);
+  MethodImage mean = mean_of_groups(groups);
   add_risk_of_mean(groups, mean);
   return mean.risk_rows;
 }

@@ -20,7 +20,7 @@ constexpr int kBlock = 16;
 constexpr double kShareOfBlocks = 0.95;
 
 /// Limits of doubt_of(). In an image with fewer than kFewestPixels pixels, 1 % of them is too few to judge.
-constexpr double kFewPixels = 0.01, kMostInFewPixels = 0.4, kMostUncertainty = 0.5, kMostDisagreement = 4;
+constexpr double kFewPixels = 0.01, kMostInFewPixels = 0.4;
 constexpr size_t kFewestPixels = 400;
 
 constexpr double kDarkest = 0.1;  // the root of relMSE's 0.01
@@ -119,13 +119,6 @@ std::string doubt_of(const EstimatorResult& result, double samples, uint32_t rel
   if (samples < reliable_samples) return fmt::format("fewer than {} samples per pixel", reliable_samples);
   if (const double share = share_of_few(result); share > kMostInFewPixels)
     return fmt::format("{:.0f} % of it lies in {:.0f} % of the pixels", 100 * share, 100 * kFewPixels);
-  if (!result.verdict) return "";
-  const auto& [uncertainty, ratio] = *result.verdict;
-  if (!std::isfinite(uncertainty)) return "held-out samples do not confirm it";
-  if (uncertainty > kMostUncertainty)
-    return fmt::format("held-out samples determine it only to ±{:.0f} %", 100 * uncertainty);
-  if (ratio > kMostDisagreement || ratio < 1 / kMostDisagreement)
-    return fmt::format("held-out samples give {:.2g} times what the estimator predicts", ratio);
   return "";
 }
 

@@ -44,14 +44,13 @@ struct PredictedError {
   std::optional<PredictedBounds> bounds;  ///< around it; empty if unknown (EstimatorResult::interval)
   /// Why it is unreliable; empty if it is reliable. With an interval: it is wider than kReliableFactor of
   /// error_interval.h, or cannot be given. Otherwise: there are few samples per pixel; or 1 % of the pixels hold more
-  /// than 40 % of the error; or held-out samples determine it no better than to half of itself, or give more than four
-  /// times or less than a quarter of the estimator's prediction (for results scaled by calibrate()). Light that no
-  /// sample has found is not seen here either. Measured in docs/methods/error-estimates.md.
+  /// than 40 % of the error. Light that no sample has found is not seen here either. Measured in
+  /// docs/methods/error-estimates.md.
   std::string doubt;
 };
 
 /// For a result with standard errors; empty if it has none. `samples`: per pixel, of all passes together, infinite if
-/// unknown; fewer than `reliable_samples` (Estimator::reliable_samples) are few.
+/// unknown; fewer than `reliable_samples` (Method::reliable_samples) are few.
 std::optional<PredictedError> predicted_error(const EstimatorResult& result, double samples, uint32_t reliable_samples);
 
 }  // namespace covary

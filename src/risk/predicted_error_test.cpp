@@ -61,22 +61,6 @@ TEST(PredictedError, IsDoubtedWhereFewPixelsHoldIt) {
   EXPECT_EQ(predicted_error(result, 48, 48)->doubt, "") << "six pixels have no hundredth";
 }
 
-TEST(PredictedError, IsDoubtedWhereHeldOutSamplesDoNotConfirmIt) {
-  EstimatorResult result;
-  result.estimate = result.std_error = Image(2, 2, 3);
-  const auto doubt = [&](double uncertainty, double ratio) {
-    result.verdict = {uncertainty, ratio};
-    return predicted_error(result, 48, 48)->doubt;
-  };
-  EXPECT_EQ(doubt(0.2, 1), "");
-  EXPECT_EQ(doubt(0.49, 3.9), "");
-  EXPECT_EQ(doubt(0.49, 0.26), "");
-  EXPECT_EQ(doubt(0.8, 1), "held-out samples determine it only to ±80 %");
-  EXPECT_EQ(doubt(std::numeric_limits<double>::infinity(), 1), "held-out samples do not confirm it");
-  EXPECT_EQ(doubt(0.2, 33), "held-out samples give 33 times what the estimator predicts");
-  EXPECT_EQ(doubt(0.2, 0.2), "held-out samples give 0.2 times what the estimator predicts");
-}
-
 TEST(PredictedError, NeedsAStandardError) {
   EstimatorResult result;
   result.estimate = Image(2, 2, 3);

@@ -4,7 +4,10 @@
 
 #include <atomic>
 #include <cstring>
+#include <functional>
+#include <memory>
 #include <string>
+#include <variant>
 
 #include "film/image_file.h"
 #include "plans/estimator_plans.h"
@@ -29,11 +32,12 @@ inline RenderRequest request_of(uint32_t spp) {
 }
 
 /// Of a CRN and an independent image: the average of the first group of each.
-inline Estimator average_estimator() {
-  Estimator method;
+inline Method average_estimator() {
+  Method method;
   method.name = method.text = "average";
   method.fewest_groups = 3;
-  method.apply = [](const GroupedImage& crn, const GroupedImage& independent, const PairSettings&) {
+  PassPair pair;
+  pair.image = [](const GroupedImage& crn, const GroupedImage& independent, const MethodSettings&) {
     EstimatorResult result;
     result.estimate = Image(crn.width, crn.height, 3);
     for (int y = 0; y < crn.height; ++y)
@@ -42,9 +46,25 @@ inline Estimator average_estimator() {
           result.estimate.pixel(x, y)[c] = 0.5f * (crn.pixel(x, y)[c] + independent.pixel(x, y)[c]);
     return result;
   };
+  method.passes = pair;
   return method;
 }
 inline Plan average_plan() { return pair_plan(average_estimator()); }
+
+/// The plan of a pair with another image: `make` gets a function that makes the usual one, and its settings.
+inline Plan with_image(const Plan& plan,
+                       const std::function<EstimatorResult(const std::function<EstimatorResult()>& usual,
+                                                           const MethodSettings& settings)>& make) {
+  Method method = *plan.method;
+  PassPair& pair = std::get<PassPair>(method.passes);
+  pair.image = [make, usual = pair.image](const GroupedImage& crn, const GroupedImage& independent,
+                                          const MethodSettings& settings) {
+    return make([&] { return usual(crn, independent, settings); }, settings);
+  };
+  Plan result = plan;
+  result.method = std::make_shared<const Method>(method);
+  return result;
+}
 
 /// Stops a render after a number of tiles.
 struct StopAfter {
