@@ -197,7 +197,7 @@ def _plan(scene: Scene, spp: int, estimator: str | None, seed: int, sample_range
     if scene.integrator not in ("path", ""):
         raise UsageError(f"the integrator '{scene.integrator}' trains or traces light over the whole frame; on a "
                          "cluster use path")
-    if estimator in _OF_ONE_IMAGE:
+    if estimator is None or estimator in _OF_ONE_IMAGE:
         check_some(render_here, options)
         if unknown := set(options) - set(_OF_ONE_PASS):
             raise UsageError(f"{min(unknown)}: is not an argument of estimator {estimator or DEFAULT!r}; expected "

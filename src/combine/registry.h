@@ -6,13 +6,15 @@
 #include <string>
 #include <vector>
 
-#include "denoising/mixed_denoising.h"
+#include "denoising/mixture_name.h"
 #include "estimators/iicv.h"
 #include "estimators/method.h"
 #include "risk/plain_mean.h"
 #include "settings/settings.h"
 
 namespace covary {
+
+struct DenoisingChoice;
 
 struct MethodPlugin {
   const char* name;

@@ -20,6 +20,7 @@
 #include "denoising/candidates.h"
 #include "denoising/denoising_parts.h"
 #include "denoising/history.h"
+#include "denoising/mixture_name.h"
 #include "estimators/method.h"
 #include "settings/settings.h"
 
@@ -55,9 +56,7 @@ Method with_denoising(const Method& base, const MixedDenoisingOptions& options);
 /// Whether with_denoising() takes the method as base.
 bool can_be_denoised(const Method& method);
 
-/// The mean with denoised images mixed in: covary's default.
-inline constexpr const char* kMixture = "mixture";
-/// What it denoises, with these options. Throws Error(kUsage) listing everything wrong with them.
+/// What kMixture denoises, with these options. Throws Error(kUsage) listing everything wrong with them.
 Method make_mixture(Settings& options);
 
 /// MixedDenoisingOptions as text, as on the command line.

@@ -117,8 +117,8 @@ class BadArrays(PackageTest):
         holed[3, 2, 1, 0] = numpy.nan
         result = covary.combine(holed, INDEPENDENT)
         self.assertEqual(result.nonfinite_pixels, 1)
-        self.assertIn("CRN: 1 of 480 pixels hold NaN, infinite or overflowing values, the first at (1, 2) in render 4",
-                      result.warnings[0])
+        self.assertIn("CRN image: 1 of 480 pixels hold NaN, infinite or overflowing values, the first at (1, 2) in "
+                      "render 4", result.warnings[0])
         holed[:, :, :8] = numpy.nan
         message = self.refused(holed, error=covary.InputError)
         self.assertTrue(message.endswith("(force=True combines them anyway)"))
