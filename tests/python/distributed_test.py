@@ -332,7 +332,7 @@ class Cluster(PackageTest):
                                    ({"denoise": "error", "oidn": "/nowhere"}, "/nowhere"),
                                    ({"settings": {"output": "x.exr"}},
                                     "settings: found 'output'; expected one of filter"),
-                                   ({"settings": {"sampling": "crn"}}, "sampling: found 'crn' with estimator 'iicv'"),
+                                   ({"settings": {"sampling": "crn"}}, "sampling is an option of estimator none"),
                                    ({"window": 4}, "window '4': expected an odd whole number")):
                 self.assertIn(text, self.message_of(covary.UsageError, covary.distributed.render, self.client,
                                                     self.scene(), 24, "iicv", **keywords))
