@@ -5,7 +5,6 @@
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 
 #include "core/arena.h"
 #include "core/srgb.h"
@@ -14,32 +13,15 @@
 #include "io/load_scene.h"
 #include "pbrt/pbrt_objects.h"
 #include "support/files.h"
+#include "support/pbrt_scenes.h"
 
 namespace covary::pbrt_numbers_test {
 namespace {
 
 using test_support::contains;
-using test_support::message_of;
 
-class PbrtNumbers : public ::testing::Test {
+class PbrtNumbers : public test_support::PbrtScenes {
  protected:
-  void write(const std::string& name, const std::string& bytes) {
-    std::ofstream(folder_.file(name), std::ios::binary) << bytes;
-  }
-  LoadedScene load(const std::string& text) {
-    write("scene.pbrt", text);
-    return load_scene(folder_.file("scene.pbrt"));
-  }
-  /// The world, seen by the default camera.
-  LoadedScene world(const std::string& text) { return load("Camera \"perspective\"\nWorldBegin\n" + text); }
-  std::string warnings(const LoadedScene& scene) {
-    std::string all;
-    for (const std::string& warning : scene.warnings) all += warning + "\n";
-    return all;
-  }
-  std::string errors(const std::string& text) {
-    return message_of([&] { load(text); });
-  }
   /// Four grey texels, v upwards: 51, 102 in the lower row, 153, 204 in the upper one.
   void write_quarters() {
     std::vector<uint8_t> rgb;
@@ -57,8 +39,6 @@ class PbrtNumbers : public ::testing::Test {
     const BsdfClosure* closure = hit.shape->bsdf()->bind(hit, wo.z > 0, TransportMode::kRadiance, arena);
     return closure->eval(wo, wi).value.g * kPi;
   }
-
-  test_support::TemporaryFolder folder_;
 };
 
 /// texel: (u, v) quarter of quarters.png.

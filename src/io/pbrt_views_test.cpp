@@ -9,6 +9,7 @@
 #include "core/equal_area.h"
 #include "io/load_scene.h"
 #include "support/files.h"
+#include "support/pbrt_scenes.h"
 
 namespace covary::pbrt_views_test {
 namespace {
@@ -21,19 +22,7 @@ float difference(const Spectrum& a, const Spectrum& b) {
   return std::max({std::abs(a.r - b.r), std::abs(a.g - b.g), std::abs(a.b - b.b)});
 }
 
-class PbrtViews : public ::testing::Test {
- protected:
-  LoadedScene load(const std::string& text) {
-    std::ofstream(folder_.file("scene.pbrt"), std::ios::binary) << text;
-    return load_scene(folder_.file("scene.pbrt"));
-  }
-  std::string warnings(const LoadedScene& scene) {
-    std::string all;
-    for (const std::string& warning : scene.warnings) all += warning + "\n";
-    return all;
-  }
-  test_support::TemporaryFolder folder_;
-};
+class PbrtViews : public test_support::PbrtScenes {};
 
 const std::string kFilm = "Film \"rgb\" \"integer xresolution\" 40 \"integer yresolution\" 20\n";
 const std::string kBall = "WorldBegin\nLightSource \"infinite\"\nShape \"sphere\"\n";

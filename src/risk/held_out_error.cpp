@@ -120,12 +120,12 @@ MethodImage image_with_rows(const Method& base, const GroupedImage& crn, const G
     images[half] = base.image({half_crn.view(), half_independent.view()}, half_settings).estimate;
     h[half] = moments(half_independent.view(), valid, 0, 0.0f);
   }
-  const HeldOutInput input{{&images[0], &images[1]}, {&h[0], &h[1]}, nullptr, &valid};
+  const std::array<const Image*, 2> halves = {&images[0], &images[1]};
+  const std::array<const Moments*, 2> held_out = {&h[0], &h[1]};
   const Moments all = moments(independent, valid, 0, 0.0f);
-  whole.risk_rows =
-      image_risk({&whole.estimate, input.halves, &all, input.independent, &independent, &whole.estimate, &valid});
+  whole.risk_rows = image_risk({&whole.estimate, halves, &all, held_out, &independent, &whole.estimate, &valid});
   whole.risk_kind = ErrorKind::kPair;
-  whole.bias = held_out_bias({input.halves, input.halves, input.independent, &valid});
+  whole.bias = held_out_bias({halves, halves, held_out, &valid});
   return whole;
 }
 
