@@ -3,29 +3,12 @@
 // that sort light by its time of arrival beside the usual picture. docs/scene-format.md lists them.
 #pragma once
 
-#include <map>
-#include <string>
-
 #include "scene/parameters.h"
 
 namespace covary {
 
-/// Warnings that many objects of a file share: each is told once, with its first place and the number of places.
-class SharedWarnings {
- public:
-  void add(const SourceLocation& where, const std::string& message);
-  void tell(Diagnostics& diagnostics) const;
-
- private:
-  struct Places {
-    SourceLocation first;
-    size_t n = 0;
-  };
-  std::map<std::string, Places> told_;
-};
-
 /// Turns a film of a fork into the usual one and removes parameters that do not change the picture. `old`: of Mitsuba
 /// 0.x, which ignores what a plugin does not ask for.
-void adopt_forms_of_forks(ObjectDescription& object, bool old, SharedWarnings& warnings);
+void adopt_forms_of_forks(ObjectDescription& object, bool old, Diagnostics& diagnostics);
 
 }  // namespace covary

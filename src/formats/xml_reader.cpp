@@ -72,7 +72,6 @@ class Reader {
       const std::vector<ObjectDescription*> ordered = break_cycles(objects_, diagnostics_);
       limit_expansion(ordered, kMaxNesting, diagnostics_);
       evaluate_spectra(ordered);
-      shared_warnings_.tell(diagnostics_);
       defines_.report_unused(name, diagnostics_);
       result.scene = std::get<ObjectPtr>(holder->properties[0].value);
     }
@@ -237,7 +236,7 @@ class Reader {
     }
     read_children(document, node, *object, depth, nesting);
     if (document.old) upgrade_object(*object, diagnostics_);
-    adopt_forms_of_forks(*object, document.old, shared_warnings_);
+    adopt_forms_of_forks(*object, document.old, diagnostics_);
     if (object->kind == "bsdf" && object->type == "mixturebsdf") expand_mixture(*object, objects_, diagnostics_);
     // A missing type was reported; users of the object must not report it again.
     add(parent, {attributes.get("name"), attributes.complete() ? ObjectPtr(object) : ObjectPtr(), where});
@@ -336,7 +335,6 @@ class Reader {
   SceneObjects objects_;  // all of them
   ObjectIds ids_;
   std::vector<SceneAlias> aliases_;
-  SharedWarnings shared_warnings_;
   size_t n_text_bytes_ = 0;
   int n_includes_ = 0;
 };

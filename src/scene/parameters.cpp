@@ -22,44 +22,53 @@ constexpr size_t kMostShown = 100;  // errors in one message
 
 // ---- Diagnostics ----------------------------------------------------------------------------------------------------
 
-void Diagnostics::error(const SourceLocation& where, const std::string& message) {
-  errors_.push_back({where, message});
-}
-
-void Diagnostics::warn(const SourceLocation& where, const std::string& message) {
-  warnings_.push_back(where.file.empty() ? message : where.text() + ": " + message);
-}
-
 namespace {
+
+/// "file:line:column: message"; only the message for a place outside of files.
+std::string located(const SourceLocation& where, const std::string& message) {
+  return where.file.empty() ? message : where.text() + ": " + message;
+}
 
 auto place(const SourceLocation& where) { return std::tie(where.file, where.line, where.column); }
 
 }  // namespace
 
+void Diagnostics::error(const SourceLocation& where, const std::string& message) {
+  errors_.push_back({where, message});
+}
+
+void Diagnostics::warn(const SourceLocation& where, const std::string& message) {
+  warnings_.push_back(located(where, message));
+}
+
 void Diagnostics::unknown(const SourceLocation& where, const std::string& what, const std::string& hint,
                           const std::string& instead) {
   if (!ignores_unknown_) return error(where, "unknown " + what + hint);
-  Ignored& entry = ignored_[fmt::format("unknown {} {}", what, instead)];
+  warn_shared(where, fmt::format("unknown {} {}", what, instead));
+}
+
+void Diagnostics::warn_shared(const SourceLocation& where, const std::string& message) {
+  Places& entry = shared_[message];
   if (entry.n++ == 0 || place(where) < place(entry.first)) entry.first = where;
 }
 
 void Diagnostics::append(const Diagnostics& other) {
   errors_.insert(errors_.end(), other.errors_.begin(), other.errors_.end());
   warnings_.insert(warnings_.end(), other.warnings_.begin(), other.warnings_.end());
-  for (const auto& [message, entry] : other.ignored_) {
-    Ignored& own = ignored_[message];
+  for (const auto& [message, entry] : other.shared_) {
+    Places& own = shared_[message];
     if (own.n == 0 || place(entry.first) < place(own.first)) own.first = entry.first;
     own.n += entry.n;
   }
 }
 
 std::vector<std::string> Diagnostics::warnings() const {
-  std::vector<std::pair<std::string, Ignored>> ignored(ignored_.begin(), ignored_.end());
-  std::stable_sort(ignored.begin(), ignored.end(),
+  std::vector<std::pair<std::string, Places>> shared(shared_.begin(), shared_.end());
+  std::stable_sort(shared.begin(), shared.end(),
                    [](const auto& a, const auto& b) { return place(a.second.first) < place(b.second.first); });
   std::vector<std::string> texts = warnings_;
-  for (const auto& [message, entry] : ignored)
-    texts.push_back(entry.first.text() + ": " + message + (entry.n > 1 ? fmt::format(" ({} times)", entry.n) : ""));
+  for (const auto& [message, entry] : shared)
+    texts.push_back(located(entry.first, message) + (entry.n > 1 ? fmt::format(" ({} times)", entry.n) : ""));
   return texts;
 }
 
@@ -74,7 +83,7 @@ void Diagnostics::throw_if_errors() const {
   std::string text;
   for (size_t i = 0; i < std::min(sorted.size(), kMostShown); ++i) {
     if (!text.empty()) text += '\n';
-    text += sorted[i].where.file.empty() ? sorted[i].message : sorted[i].where.text() + ": " + sorted[i].message;
+    text += located(sorted[i].where, sorted[i].message);
   }
   if (sorted.size() > kMostShown) text += fmt::format("\n… and {} more errors", sorted.size() - kMostShown);
   throw Error(ErrorCode::kInput, text);

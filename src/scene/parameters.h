@@ -43,13 +43,15 @@ class Diagnostics {
                const std::string& instead = "is ignored");
   /// Harmless problem; callers should count repeated messages of one kind and report them once.
   void warn(const SourceLocation& where, const std::string& message);
+  /// The same, of a kind that many objects share: told once, with the first place and the number of places.
+  void warn_shared(const SourceLocation& where, const std::string& message);
   /// Takes over all entries of `other`; for objects constructed in parallel.
   void append(const Diagnostics& other);
   bool has_errors() const { return !errors_.empty(); }
   /// Throws Error(kInput) with all errors, sorted by file and line, one per line as "file:line:column: message"; after
   /// 100 errors, the number of remaining ones.
   void throw_if_errors() const;
-  /// Warnings in the order of their recording, then what was unknown, by place.
+  /// Warnings in the order of their recording, then the shared ones, by place.
   std::vector<std::string> warnings() const;
 
  private:
@@ -57,14 +59,14 @@ class Diagnostics {
     SourceLocation where;
     std::string message;
   };
-  struct Ignored {
+  struct Places {
     SourceLocation first;
     size_t n = 0;
   };
   bool ignores_unknown_;
   std::vector<Entry> errors_;
   std::vector<std::string> warnings_;
-  std::map<std::string, Ignored> ignored_;
+  std::map<std::string, Places> shared_;  // by message
 };
 
 /// A spectrum given by pairs of wavelength (nm) and value, strictly increasing in wavelength, linearly interpolated,
