@@ -46,15 +46,8 @@ Method make_cv_baseline(Settings& parameters) {
   check_k(o.k, o.window, problems);
   throw_if_any(kCvBaseline, problems);
 
-  PassPair pair;
-  pair.image = [o](const GroupedImage& crn, const GroupedImage& independent, const MethodSettings& settings) {
-    CvBaselineOptions options = o;
-    options.std_error = settings.std_error;
-    return cv_baseline(crn, independent, options);
-  };
-  pair.explain = explain_by_probe(cv_baseline, o);
   Method estimator;
-  estimator.passes = pair;
+  estimator.passes = pair_by(cv_baseline, o);
   estimator.summary = "control variates that ignore the errors of the independent image";
   estimator.predicts_error = true;
   estimator.reliable_samples = kReliableSamples;

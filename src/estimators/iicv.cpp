@@ -99,14 +99,7 @@ Method make_iicv(Settings& parameters) {
   standard.most_first_spp = std::numeric_limits<int>::max();
   standard.reads_groups = true;
   Method estimator;
-  PassPair pair;
-  pair.image = [o](const GroupedImage& crn, const GroupedImage& independent, const MethodSettings& settings) {
-    IicvOptions options = o;
-    options.std_error = settings.std_error;
-    return iicv(crn, independent, options);
-  };
-  pair.explain = explain_by_probe(iicv, o);
-  estimator.passes = pair;
+  estimator.passes = pair_by(iicv, o);
   estimator.adaptive =
       ask_for_adaptive(p, standard, "The CRN pass decides how many independent samples each pixel gets");
 

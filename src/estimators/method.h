@@ -157,16 +157,24 @@ struct Method {
   MethodImage image(const Samples& samples, const MethodSettings& settings) const;
 };
 
-/// PassPair::explain for a function of grouped images whose options include a probe.
+/// For a function of grouped images whose options include `std_error` and a probe.
 template <typename Function, typename Options>
-auto explain_by_probe(Function function, const Options& options) {
-  return [function, options](const GroupedImage& crn, const GroupedImage& independent, int x, int y) {
+PassPair pair_by(Function function, const Options& options) {
+  PassPair pair;
+  pair.image = [function, options](const GroupedImage& crn, const GroupedImage& independent,
+                                   const MethodSettings& settings) {
+    Options own = options;
+    own.std_error = settings.std_error;
+    return function(crn, independent, own);
+  };
+  pair.explain = [function, options](const GroupedImage& crn, const GroupedImage& independent, int x, int y) {
     PixelProbe probe{x, y, {}};
     Options probing = options;
     probing.probe = &probe;
     function(crn, independent, probing);
     return probe.control_variates;
   };
+  return pair;
 }
 
 }  // namespace covary
