@@ -144,7 +144,7 @@ void for_each_image(
                fmt::join(inputs, "', '"));
   if (!o.quiet)
     fmt::print(stderr, "{} images in {:.1f} s{}\n", n_done, watch.seconds(),
-               n_kept > 0 ? fmt::format("; {} were there already", n_kept) : "");
+               n_kept > 0 ? fmt::format("; {} existed already", n_kept) : "");
   if (!failed.empty())
     throw Error(ErrorCode::kInput, fmt::format("{} of {} images failed: {}", failed.size(),
                                                n_done + n_kept + failed.size(), fmt::join(failed, ", ")));
