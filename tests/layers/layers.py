@@ -14,6 +14,7 @@ import sys
 # What each module may include, the arrows of docs/architecture.md. Entries are direct; everything behind them follows.
 ARROWS = {
     "core": [],
+    "device": ["core"],
     "settings": ["core"],
     "imageio": ["core"],
     "film": ["imageio"],

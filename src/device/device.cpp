@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "device/device.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <map>
+#include <optional>
+
+#include "core/content_hash.h"
+#include "device/binary_cache.h"
+#include "device/kernel_source.h"
+
+namespace covary::device {
+
+RawBuffer::RawBuffer(std::shared_ptr<Backend> backend, size_t bytes) : backend_(std::move(backend)), bytes_(bytes) {
+  // Drivers refuse buffers of no bytes.
+  handle_ = backend_->allocate(std::max<size_t>(bytes, 1));
+}
+
+void RawBuffer::reset() noexcept {
+  if (handle_) backend_->release(handle_);
+  backend_.reset();
+  handle_ = 0;
+  bytes_ = 0;
+}
+
+/// Programs of an opened device by what they were made of.
+struct Device::Programs {
+  explicit Programs(Backend& b) : backend(b) {}
+  ~Programs() {
+    for (const auto& [key, program] : loaded) backend.unload(program);
+  }
+  Programs(const Programs&) = delete;
+  Programs& operator=(const Programs&) = delete;
+
+  uint64_t get(const std::string& source, const std::vector<std::string>& definitions) {
+    const DeviceInfo& info = backend.info();
+    const std::string key = key_text(
+        fmt::format("{}\n{}\n{}\n{}\n{}", info.id(), info.name, info.driver, fmt::join(definitions, "\n"), source));
+    if (const auto found = loaded.find(key); found != loaded.end()) return found->second;
+    const std::filesystem::path folder = cache_folder();
+    if (const std::optional<std::string> binary = cached_binary(folder, key)) {
+      try {
+        return loaded[key] = backend.load(*binary);
+      } catch (const Failure&) {  // of a driver that calls itself the same; compile it again
+        loaded.erase(key);
+      }
+    }
+    const std::string binary = backend.compile(source, definitions);
+    const uint64_t program = backend.load(binary);
+    loaded[key] = program;
+    store_binary(folder, key, binary);
+    return program;
+  }
+
+  Backend& backend;
+  std::map<std::string, uint64_t> loaded;
+  std::map<std::pair<uint64_t, std::string>, uint64_t> kernels;
+};
+
+Device::Device(std::shared_ptr<Backend> backend)
+    : backend_(std::move(backend)), programs_(std::make_unique<Programs>(*backend_)) {}
+Device::Device(Device&&) noexcept = default;
+Device& Device::operator=(Device&& other) noexcept {
+  std::swap(backend_, other.backend_);
+  std::swap(programs_, other.programs_);
+  return *this;
+}
+Device::~Device() = default;
+
+Kernel Device::kernel(const std::string& file, const std::string& name, const std::vector<std::string>& definitions) {
+  return kernel_of(kernel_source(file), name, definitions);
+}
+
+Kernel Device::kernel_of(const std::string& source, const std::string& name,
+                         const std::vector<std::string>& definitions) {
+  const uint64_t program = programs_->get(source, definitions);
+  uint64_t& handle = programs_->kernels[{program, name}];
+  if (!handle) handle = backend_->kernel(program, name);
+  return {handle, name};
+}
+
+void Device::launch_with(const Kernel& kernel, Range global, Range group, std::span<const Argument> arguments) {
+  const auto groups = [](uint32_t items, uint32_t in_group) { return (items + in_group - 1) / in_group; };
+  const uint32_t n[3] = {groups(global.x, group.x), groups(global.y, group.y), groups(global.z, group.z)};
+  if (n[0] == 0 || n[1] == 0 || n[2] == 0) return;
+  backend_->launch(kernel.handle, n, {group.x, group.y, group.z}, arguments);
+}
+
+void Device::finish() { backend_->finish(); }
+
+void Device::write_bytes(const RawBuffer& to, size_t offset, const void* from, size_t bytes) {
+  COVARY_CHECK(offset + bytes <= to.bytes(), "what is written fits the buffer");
+  if (bytes) backend_->write(to.handle(), offset, from, bytes);
+}
+
+void Device::read_bytes(const RawBuffer& from, size_t offset, void* to, size_t bytes) {
+  COVARY_CHECK(offset + bytes <= from.bytes(), "what is read is in the buffer");
+  if (bytes) backend_->read(from.handle(), offset, to, bytes);
+}
+
+}  // namespace covary::device
