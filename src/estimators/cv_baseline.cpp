@@ -6,13 +6,13 @@
 
 #include "core/error.h"
 #include "estimators/control_variates.h"
+#include "estimators/iicv_steps.h"
 #include "estimators/method.h"
 #include "estimators/missing_light.h"
 
 namespace covary {
 
-EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& independent,
-                            const CvBaselineOptions& options) {
+VariateSteps steps_of(const GroupedImage& crn, const GroupedImage& independent, const CvBaselineOptions& options) {
   COVARY_CHECK(kWindowRange.contains(options.window) && options.ridge >= 0,
                "options of cv-baseline are in the ranges that cv_baseline.h states");
   std::vector<std::string> problems;
@@ -20,18 +20,26 @@ EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& indepen
   check_inputs(crn, independent, 3, options.std_error ? 2 : 1, problems);
   throw_if_any("cv_baseline", problems);
 
+  VariateSteps steps;
+  steps.settings = common_settings(options);
+  // [YM2025] Eq. (6) is Eq. (10) with V_h = 0. The ridge needs no scaling by 1 / (T - 1): it is relative to the mean
+  // diagonal, of X^T X here and of X^T X / (T - 1) there.
+  steps.settings.ridge = options.ridge;
+  steps.missing_light = steps.std_error = options.std_error;
+  return steps;
+}
+
+EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& independent,
+                            const CvBaselineOptions& options) {
+  const VariateSteps steps = steps_of(crn, independent, options);
   EstimatorResult result;
   const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
   const int border = std::max(options.window, kMissingWindow) / 2;
   const Moments g = moments(crn, valid, border, kFar), h = moments(independent, valid, border, 0.0f);
-  ControlVariateSettings settings = common_settings(options);
-  // [YM2025] Eq. (6) is Eq. (10) with V_h = 0. The ridge needs no scaling by 1 / (T - 1): it is relative to the mean
-  // diagonal, of X^T X here and of X^T X / (T - 1) there.
-  settings.ridge = options.ridge;
   ControlVariateInput input{crn, &g, &h.mean, nullptr, &h.variance_of_mean};
   std::optional<Planes> missing;
-  if (options.std_error) input.missing = &missing.emplace(missing_light(g, h, valid, border));
-  apply_control_variates(input, settings, valid, result);
+  if (steps.missing_light) input.missing = &missing.emplace(missing_light(g, h, valid, border));
+  apply_control_variates(input, steps.settings, valid, result);
   fill_invalid(crn, independent, valid, result.estimate);
   return result;
 }

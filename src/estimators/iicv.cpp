@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "estimators/control_variates.h"
+#include "estimators/iicv_steps.h"
 #include "estimators/method.h"
 #include "estimators/missing_light.h"
 #include "estimators/pilot.h"
@@ -29,18 +30,9 @@ bool in_range(const IicvOptions& o) {
   return kWindowRange.contains(o.window) && o.sample_fraction >= 0 && o.sample_fraction <= 1 && o.mean_constraint >= 0;
 }
 
-ControlVariateSettings settings_of(const IicvOptions& options) {
-  ControlVariateSettings settings = common_settings(options);
-  settings.symmetric = options.penalty != Penalty::kAsymmetric;
-  settings.mean_constraint = options.mean_constraint;
-  settings.sample_fraction = options.sample_fraction;
-  settings.std_error = options.std_error || options.residual_correction;
-  return settings;
-}
-
 }  // namespace
 
-EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, const IicvOptions& options) {
+VariateSteps steps_of(const GroupedImage& crn, const GroupedImage& independent, const IicvOptions& options) {
   COVARY_CHECK(in_range(options), "options of iicv are in the ranges that iicv.h states");
   std::vector<std::string> problems;
   check_k(options.k, options.window, problems);
@@ -49,20 +41,34 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
   check_inputs(crn, independent, 3, needs_variance ? 2 : 1, problems);
   throw_if_any(kIicv, problems);
 
+  VariateSteps steps;
+  steps.settings = common_settings(options);
+  steps.settings.symmetric = options.penalty != Penalty::kAsymmetric;
+  steps.settings.mean_constraint = options.mean_constraint;
+  steps.settings.sample_fraction = options.sample_fraction;
+  steps.settings.std_error = options.std_error || options.residual_correction;
+  steps.error_of_h = options.penalty == Penalty::kSample ? ErrorOfH::kVariance : ErrorOfH::kPilot;
+  steps.missing_light = steps.settings.std_error || options.mean_constraint > 0;
+  steps.residual_correction = options.residual_correction;
+  steps.residual_options = options.residual_options;
+  steps.std_error = options.std_error;
+  return steps;
+}
+
+EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, const IicvOptions& options) {
+  const VariateSteps steps = steps_of(crn, independent, options);
   EstimatorResult result;
   const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
   const int border = std::max({options.window, kPilotWindow, kMissingWindow}) / 2;
   const Moments g = moments(crn, valid, border, kFar), h = moments(independent, valid, border, 0.0f);
-  const ControlVariateSettings settings = settings_of(options);
   ControlVariateInput input{crn, &g, &h.mean, &h.variance_of_mean, &h.variance_of_mean};
   std::optional<Planes> error, missing;
-  if (options.penalty != Penalty::kSample) input.error_of_h = &error.emplace(pilot_error(g, h, kPilotWindow, border));
-  if (settings.std_error || settings.mean_constraint > 0)
-    input.missing = &missing.emplace(missing_light(g, h, valid, border));
-  apply_control_variates(input, settings, valid, result);
-  if (options.residual_correction) {
-    add_residual_correction(h, options.residual_options, valid, result.std_error, result.estimate);
-    if (!options.std_error) result.std_error = Image();
+  if (steps.error_of_h == ErrorOfH::kPilot) input.error_of_h = &error.emplace(pilot_error(g, h, kPilotWindow, border));
+  if (steps.missing_light) input.missing = &missing.emplace(missing_light(g, h, valid, border));
+  apply_control_variates(input, steps.settings, valid, result);
+  if (steps.residual_correction) {
+    add_residual_correction(h, steps.residual_options, valid, result.std_error, result.estimate);
+    if (!steps.std_error) result.std_error = Image();
   }
   fill_invalid(crn, independent, valid, result.estimate);
   return result;

@@ -10,6 +10,7 @@
 
 #include "core/parallel.h"
 #include "film/groups.h"
+#include "filters/relative_counts.h"
 
 namespace covary {
 
@@ -109,25 +110,34 @@ PixelMoments weighted_moments(const float* p, int groups, uint32_t count, int fi
 }
 
 /// Moments::relative_count.
-std::optional<Planes> relative_counts(const GroupedImage& image, int border) {
-  if (!image.counts) return std::nullopt;
-  const uint32_t* end = image.counts + static_cast<size_t>(image.width) * image.height;
-  const double mean = image.mean_count > 0
-                          ? image.mean_count
-                          : std::accumulate(image.counts, end, 0.0) / static_cast<double>(end - image.counts);
-  if (std::all_of(image.counts, end, [&](uint32_t n) { return n == mean; })) return std::nullopt;
+std::optional<Planes> relative_count_plane(const GroupedImage& image, int border) {
+  const std::vector<float> counts = relative_counts(image);
+  if (counts.empty()) return std::nullopt;
   Planes planes(image.width, image.height, 1, border, 1.0f);
   for (int y = 0; y < image.height; ++y)
-    for (int x = 0; x < image.width; ++x) planes.row(0, y)[x] = static_cast<float>(image.count(x, y) / mean);
+    std::copy_n(counts.data() + static_cast<size_t>(y) * image.width, image.width, planes.row(0, y));
   return planes;
 }
 
 }  // namespace
 
+std::vector<float> relative_counts(const GroupedImage& image) {
+  if (!image.counts) return {};
+  const uint32_t* end = image.counts + static_cast<size_t>(image.width) * image.height;
+  const double mean = image.mean_count > 0
+                          ? image.mean_count
+                          : std::accumulate(image.counts, end, 0.0) / static_cast<double>(end - image.counts);
+  if (std::all_of(image.counts, end, [&](uint32_t n) { return n == mean; })) return {};
+  std::vector<float> relative;
+  relative.reserve(static_cast<size_t>(end - image.counts));
+  for (const uint32_t* n = image.counts; n < end; ++n) relative.push_back(static_cast<float>(*n / mean));
+  return relative;
+}
+
 Moments moments(const GroupedImage& image, const std::vector<unsigned char>& valid, int border, float outside,
                 int first, int step) {
   Moments m{Planes(image.width, image.height, 3, border, outside),
-            Planes(image.width, image.height, 3, border, kUseless), relative_counts(image, border)};
+            Planes(image.width, image.height, 3, border, kUseless), relative_count_plane(image, border)};
   parallel_for(image.height, 8, [&](int y) {
     for (int x = 0; x < image.width; ++x) {
       if (!valid[static_cast<size_t>(y) * image.width + x]) continue;

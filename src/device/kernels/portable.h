@@ -13,7 +13,12 @@
 //   TABLE float t[] = {…};              constants of a kernel file
 //   UNROLL                              before a loop whose number of steps is constant
 //
+// PLANTED_BUG is 0 but in tests, whose comparisons must notice a kernel that is slightly wrong.
+//
 // Products and sums are fused only where a kernel says fma(), as on the processor (filters/lanes.h).
+#ifndef PLANTED_BUG
+#define PLANTED_BUG 0
+#endif
 #ifdef __CUDACC_RTC__
 #define KERNEL extern "C" __global__ void
 #define FUNCTION static __device__ __forceinline__

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sums of values in an order that depends on their number alone.
+//
+// Definitions: GROUP, items of the work group, a power of two.
+// Compiled: GROUP=256
 #include "portable.h"
 
 // The sum of `n` values by one work group of GROUP items: item i adds i, i + GROUP, …; then the items are added in
