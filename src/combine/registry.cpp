@@ -11,6 +11,7 @@
 #include "estimators/iduw.h"
 #include "estimators/iicv.h"
 #include "estimators/polynomials.h"
+#include "gpu/pair_methods.h"
 #include "risk/held_out_error.h"
 #include "settings/option_names.h"
 
@@ -41,7 +42,7 @@ const MethodPlugin& plugin_named(const std::string& name) {
 
 }  // namespace
 
-Method make_estimator(const std::string& name, const OptionValues& values) {
+Method make_estimator(const std::string& name, const OptionValues& values, const MethodTarget& target) {
   const MethodPlugin& plugin = plugin_named(name);
   const std::vector<Option> own = options_of_estimator(name);
   for (const auto& [option, value] : values)
@@ -55,6 +56,7 @@ Method make_estimator(const std::string& name, const OptionValues& values) {
     estimator.text += is_parameter(option) ? fmt::format(" --set {}={}", option.name, given->second)
                                            : fmt::format(" --{}", option.name);
   }
+  if (target) gpu::put_on(target, values, estimator);
   return with_held_out_rows(estimator);
 }
 
@@ -81,7 +83,7 @@ std::vector<Option> options_of_estimators(const std::vector<std::string>& names)
   return merged_options(names, lists);
 }
 
-Method with_denoising(const Method& base, const DenoisingChoice& choice) {
+Method with_denoising(const Method& base, const DenoisingChoice& choice, const MethodTarget& /*target*/) {
   MixedDenoisingOptions options;
   options.mode = denoise_mode(choice.mode);
   if (options.mode != DenoiseMode::kNone && !can_be_denoised(base))
@@ -98,8 +100,9 @@ std::string usual_denoising(const std::string& estimator) {
   return estimator == kDefaultEstimator ? DenoisingChoice::kAuto : DenoisingChoice::kNone;
 }
 
-Method make_default_estimator(bool is_pair, const OptionValues& values, const DenoisingChoice& choice) {
-  return with_denoising(make_estimator(is_pair ? kDefaultOfPairs : kDefaultEstimator, values), choice);
+Method make_default_estimator(bool is_pair, const OptionValues& values, const DenoisingChoice& choice,
+                              const MethodTarget& target) {
+  return with_denoising(make_estimator(is_pair ? kDefaultOfPairs : kDefaultEstimator, values, target), choice, target);
 }
 
 Method make_default_estimator() {

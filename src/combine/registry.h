@@ -2,6 +2,7 @@
 // The estimators by name. A new estimator: one line in registry.cpp, one in CMake.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -15,6 +16,11 @@
 namespace covary {
 
 struct DenoisingChoice;
+namespace gpu {
+class Target;
+}
+/// A device to run on (gpu/target.h); null: the processor.
+using MethodTarget = std::shared_ptr<gpu::Target>;
 
 struct MethodPlugin {
   const char* name;
@@ -34,8 +40,8 @@ inline constexpr const char* kDefaultOfPairs = kIicv;   ///< whose image the def
 
 /// Throws Error(kUsage) for an unknown name, listing the known ones; for an option that the estimator does not have,
 /// listing those that have it; and for values out of range. Of the default it makes what is denoised;
-/// make_default_estimator() makes all of it.
-Method make_estimator(const std::string& name, const OptionValues& values = {});
+/// make_default_estimator() makes all of it. Methods that devices do not know run on the processor.
+Method make_estimator(const std::string& name, const OptionValues& values = {}, const MethodTarget& target = {});
 
 /// Names of the estimators for which `accepts` is true, with their default options.
 template <typename Predicate>
@@ -57,13 +63,14 @@ std::vector<Option> options_of_estimators(const std::vector<std::string>& names)
 std::vector<std::string> estimators_with_option(const std::string& option);
 
 /// The estimator with the denoising that the texts describe. Throws Error(kUsage) if it cannot be denoised.
-Method with_denoising(const Method& base, const DenoisingChoice& choice);
+Method with_denoising(const Method& base, const DenoisingChoice& choice, const MethodTarget& target = {});
 
 /// The value of `denoise` for an estimator if it was not given: auto for the default, none for those that are named.
 std::string usual_denoising(const std::string& estimator);
 /// What the default means for a pair of images (`is_pair`) or for independent samples alone, with its options and
 /// denoising. Throws Error(kUsage) like make_estimator() and with_denoising().
-Method make_default_estimator(bool is_pair, const OptionValues& values, const DenoisingChoice& choice);
+Method make_default_estimator(bool is_pair, const OptionValues& values, const DenoisingChoice& choice,
+                              const MethodTarget& target = {});
 /// For independent samples, as every command does it.
 Method make_default_estimator();
 

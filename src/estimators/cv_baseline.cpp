@@ -44,8 +44,7 @@ EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& indepen
   return result;
 }
 
-Method make_cv_baseline(Settings& parameters) {
-  Settings& p = parameters;
+CvBaselineOptions declare_cv_baseline(Settings& p) {
   CvBaselineOptions o;
   p.whole("k", o.k, kVariatesRange, kVariatesHelp);
   p.whole("window", o.window, kWindowRange, kWindowHelp);
@@ -53,7 +52,11 @@ Method make_cv_baseline(Settings& parameters) {
   std::vector<std::string> problems;
   check_k(o.k, o.window, problems);
   throw_if_any(kCvBaseline, problems);
+  return o;
+}
 
+Method make_cv_baseline(Settings& parameters) {
+  const CvBaselineOptions o = declare_cv_baseline(parameters);
   Method estimator;
   estimator.passes = pair_by(cv_baseline, o);
   estimator.summary = "control variates that ignore the errors of the independent image";

@@ -87,10 +87,9 @@ double iicv_bytes_per_pixel(const IicvOptions& options) {
   return planes * sizeof(float) + 1;
 }
 
-Method make_iicv(Settings& parameters) {
+IicvOptions declare_iicv(Settings& p) {
   static constexpr std::pair<const char*, Penalty> kPenalties[] = {
       {"pilot", Penalty::kPilot}, {"sample", Penalty::kSample}, {"asymmetric", Penalty::kAsymmetric}};
-  Settings& p = parameters;
   IicvOptions o = p.flag("paper", "iicv as published: no sample fraction, mean constraint or residual correction")
                       ? IicvOptions::paper()
                       : IicvOptions();
@@ -101,6 +100,11 @@ Method make_iicv(Settings& parameters) {
   std::vector<std::string> problems;
   check_k(o.k, o.window, problems);
   throw_if_any(kIicv, problems);
+  return o;
+}
+
+Method make_iicv(Settings& p) {
+  const IicvOptions o = declare_iicv(p);
   AdaptiveSampling standard;
   standard.most_first_spp = std::numeric_limits<int>::max();
   standard.reads_groups = true;

@@ -26,4 +26,8 @@ struct VariateSteps {
 VariateSteps steps_of(const GroupedImage& crn, const GroupedImage& independent, const IicvOptions& options);
 VariateSteps steps_of(const GroupedImage& crn, const GroupedImage& independent, const CvBaselineOptions& options);
 
+/// The options of make_iicv() and make_cv_baseline(), declared to `settings`. Throw Error(kUsage) likewise.
+IicvOptions declare_iicv(Settings& settings);
+CvBaselineOptions declare_cv_baseline(Settings& settings);
+
 }  // namespace covary

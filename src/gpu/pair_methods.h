@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Methods of a pair of images, on devices.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "estimators/method.h"
+#include "gpu/target.h"
+#include "settings/settings.h"
+
+namespace covary::gpu {
+
+/// Names of the methods of pairs that devices know.
+std::vector<std::string> device_methods();
+
+/// Lets a method of a pair, made of `options` and without what other modules add to it, run on the target; does nothing
+/// for methods that devices do not know.
+void put_on(const std::shared_ptr<Target>& target, const OptionValues& options, Method& method);
+
+}  // namespace covary::gpu
