@@ -16,6 +16,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 SCENE = pathlib.Path(__file__).resolve().parents[2] / "scenes/room.xml"
 SIZE, INSET, ZOOM = (360, 240), (144, 110, 72, 48), 5  # inset: x, y, width, height
+TITLE = 32  # height of the lines above the images, readable where the picture is shown at half of its size
 PLAIN = ["--estimator", "none", "--denoise", "none"]
 REFERENCES = ["reference1.exr", "reference2.exr"]
 TITLES = {"path-tracing": "path tracing", "oidn": "Open Image Denoise", "covary": "covary", "reference": "reference"}
@@ -40,11 +41,11 @@ def panel(covary, folder, name, title):
     image = Image.open(folder / f"{name}.png").convert("RGB")
     x, y, width, height = INSET
     inset = image.crop((x, y, x + width, y + height)).resize((width * ZOOM, height * ZOOM), Image.NEAREST)
-    result = Image.new("RGB", (SIZE[0], 22 + SIZE[1] + 4 + inset.height), "white")
+    result = Image.new("RGB", (SIZE[0], TITLE + SIZE[1] + 4 + inset.height), "white")
     ImageDraw.Draw(image).rectangle((x - 1, y - 1, x + width, y + height), outline="#ffb000")
-    ImageDraw.Draw(result).text((2, 2), title, fill="black", font=ImageFont.truetype("DejaVuSans.ttf", 15))
-    result.paste(image, (0, 22))
-    result.paste(inset, (0, 22 + SIZE[1] + 4))
+    ImageDraw.Draw(result).text((2, 1), title, fill="black", font=ImageFont.truetype("DejaVuSans.ttf", 23))
+    result.paste(image, (0, TITLE))
+    result.paste(inset, (0, TITLE + SIZE[1] + 4))
     return result
 
 
