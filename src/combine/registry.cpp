@@ -11,6 +11,7 @@
 #include "estimators/iduw.h"
 #include "estimators/iicv.h"
 #include "estimators/polynomials.h"
+#include "gpu/mixed_denoising.h"
 #include "gpu/pair_methods.h"
 #include "risk/held_out_error.h"
 #include "settings/option_names.h"
@@ -83,7 +84,7 @@ std::vector<Option> options_of_estimators(const std::vector<std::string>& names)
   return merged_options(names, lists);
 }
 
-Method with_denoising(const Method& base, const DenoisingChoice& choice, const MethodTarget& /*target*/) {
+Method with_denoising(const Method& base, const DenoisingChoice& choice, const MethodTarget& target) {
   MixedDenoisingOptions options;
   options.mode = denoise_mode(choice.mode);
   if (options.mode != DenoiseMode::kNone && !can_be_denoised(base))
@@ -93,6 +94,10 @@ Method with_denoising(const Method& base, const DenoisingChoice& choice, const M
   options.use_oidn = choice.oidn != "off";
   if (options.use_oidn) options.oidn.library = choice.oidn;
   options.history = choice.history;
+  if (target)
+    options.mix_mean = [target](const MeanMixture& request, const std::function<MixedDenoising()>& here) {
+      return target->run([&](device::Device& device) { return gpu::mix_mean(device, request); }, here);
+    };
   return with_denoising(base, options);
 }
 

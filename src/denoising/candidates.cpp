@@ -15,10 +15,8 @@
 namespace covary {
 namespace {
 
-/// Scales of guide differences, and the smallest albedo to divide by.
-constexpr float kAlbedoUnit = 0.07f, kNormalUnit = 0.2f, kLeastAlbedo = 0.02f;
-/// Bandwidths of the sharp and the smooth filter.
-constexpr float kSharp = 0.5f, kSmooth = 1;
+/// The smallest albedo to divide by.
+constexpr float kLeastAlbedo = 0.02f;
 /// Residual correction in two widths (residual_correction.h).
 constexpr ResidualOptions kWideResidual = {0.5f, 61, 4}, kNarrowResidual = {0.3f, 41, 2};
 
@@ -37,30 +35,18 @@ Image combined(const Image& a, const Image& b, const Operation& operation) {
   return result;
 }
 
-struct FilterGuides {
+struct FilterGuides : RegressionGuides {
   Planes all, normal;
-  Image albedo;                        // at least kLeastAlbedo; empty where there is none
-  std::vector<const Image*> features;  // of the regression; none: without it
-  const Image* position = nullptr;     // likewise; or null
-  bool nl_means = true;                // of the image itself, too
-  int first_row = 0;                   // of a larger image
+  Image albedo;       // at least kLeastAlbedo; empty where there is none
+  int first_row = 0;  // of a larger image
 };
 
 FilterGuides filter_guides(const Guides& guides, FilterKinds kinds) {
-  FilterGuides result;
+  FilterGuides result{regression_guides(guides, kinds)};
   const auto planes = [&](const Image& like, int count) {
     return Planes(like.width, like.height, count, kNlMeansRadius, 0.0f);
   };
   if (!guides.albedo) return result;
-  if (kinds != FilterKinds::kNlMeans) {
-    result.nl_means = kinds == FilterKinds::kAll;
-    const Guides behind_glass = network_guides(guides);
-    result.features.push_back(behind_glass.albedo);
-    if (behind_glass.normal) result.features.push_back(behind_glass.normal);
-    if (behind_glass.normal && behind_glass.normal->data != guides.normal->data)
-      result.features.push_back(guides.normal);
-    result.position = guides.position;
-  }
   result.all = planes(*guides.albedo, guides.normal ? 6 : 3);
   copy_guide(*guides.albedo, kAlbedoUnit, 0, result.all);
   result.albedo = *guides.albedo;
@@ -94,7 +80,7 @@ std::vector<std::vector<Image>> filtered(const FilterGuides& guides, CandidateBa
     for (const CandidateInput& in : inputs) {
       std::vector<const Image*> sharp = {in.estimate};
       if (base == CandidateBase::kPair) sharp.push_back(in.independent);
-      steerings.push_back({in.estimate, in.std_error, {{kSharp, sharp}, {kSmooth, {in.estimate}}}});
+      steerings.push_back({in.estimate, in.std_error, {{kSharpBandwidth, sharp}, {kSmoothBandwidth, {in.estimate}}}});
     }
     images = nl_means(steerings, or_null(guides.all), *inputs[0].valid, guides.first_row);
     const size_t n = images.size() / inputs.size();
@@ -106,7 +92,7 @@ std::vector<std::vector<Image>> filtered(const FilterGuides& guides, CandidateBa
   for (const CandidateInput& in : inputs) {
     const Image& image = demodulated.emplace_back(combined(*in.estimate, guides.albedo, std::divides<>()));
     const Image& error = demodulated.emplace_back(combined(*in.std_error, guides.albedo, std::divides<>()));
-    steerings.push_back({&image, &error, {{kSharp, {&image}}}});
+    steerings.push_back({&image, &error, {{kSharpBandwidth, {&image}}}});
   }
   images = nl_means(steerings, or_null(guides.normal), *inputs[0].valid, guides.first_row);
   demodulated.clear(), steerings.clear();
@@ -128,7 +114,7 @@ std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, cons
   std::vector<Image> images;
   std::vector<std::vector<Image>> all;
   if (guides.nl_means) {
-    steerings = {{in.estimate, in.std_error, {{kSharp, sources}, {kSmooth, sources}}}};
+    steerings = {{in.estimate, in.std_error, {{kSharpBandwidth, sources}, {kSmoothBandwidth, sources}}}};
     images = nl_means(steerings, or_null(guides.all), *in.valid, guides.first_row);
     all.emplace_back(images.begin(), images.begin() + n);
     all.emplace_back(images.begin() + n, images.end());
@@ -140,7 +126,7 @@ std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, cons
   std::vector<const Image*> without_albedo;
   for (const Image& layer : layers)
     without_albedo.push_back(&demodulated.emplace_back(combined(layer, guides.albedo, std::divides<>())));
-  steerings = {{&demodulated[0], &demodulated[1], {{kSharp, without_albedo}}}};
+  steerings = {{&demodulated[0], &demodulated[1], {{kSharpBandwidth, without_albedo}}}};
   images = nl_means(steerings, or_null(guides.normal), *in.valid, guides.first_row);
   for (Image& image : images) image = combined(image, guides.albedo, std::multiplies<>());
   all.push_back(std::move(images));
@@ -202,22 +188,49 @@ CandidateMaker::Make one_by_one(std::function<std::vector<Image>(const Candidate
   };
 }
 
+RegressionGuides regression_guides(const Guides& guides, FilterKinds kinds) {
+  RegressionGuides result;
+  if (!guides.albedo || kinds == FilterKinds::kNlMeans) return result;
+  result.nl_means = kinds == FilterKinds::kAll;
+  const Guides behind_glass = network_guides(guides);
+  result.features.push_back(behind_glass.albedo);
+  if (behind_glass.normal) result.features.push_back(behind_glass.normal);
+  if (behind_glass.normal && behind_glass.normal->data != guides.normal->data) result.features.push_back(guides.normal);
+  result.position = guides.position;
+  return result;
+}
+
+std::vector<std::string> filter_names(const Guides& guides, CandidateBase base, FilterKinds kinds) {
+  const RegressionGuides regression = regression_guides(guides, kinds);
+  std::vector<std::string> names;
+  if (!regression.features.empty()) names.emplace_back("regression");
+  if (regression.nl_means) {
+    names.emplace_back("sharp");
+    if (base == CandidateBase::kPair) names.emplace_back("sharp-independent");
+    names.emplace_back("smooth");
+  }
+  if (guides.albedo) names.emplace_back("demodulated");
+  return names;
+}
+
 CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base, FilterKinds kinds, int first_row) {
   const auto kept = std::make_shared<FilterGuides>(filter_guides(guides, kinds));
   kept->first_row = first_row;
   CandidateMaker maker;
-  if (!kept->features.empty()) maker.names = {"regression"};
-  if (kept->nl_means) {
-    maker.names.emplace_back("sharp");
-    if (base == CandidateBase::kPair) maker.names.emplace_back("sharp-independent");
-    maker.names.emplace_back("smooth");
-  }
-  if (!kept->albedo.data.empty()) maker.names.emplace_back("demodulated");
+  maker.names = filter_names(guides, base, kinds);
   maker.make = [kept, base](std::span<const CandidateInput> inputs) { return filtered(*kept, base, inputs); };
   maker.make_layers = [kept](const CandidateInput& input, std::span<const Image> layers) {
     return filtered_layers(*kept, input, layers);
   };
   return maker;
+}
+
+void check_guides(const Guides& guides) {
+  if (guides.albedo) check_guide("the albedo", *guides.albedo);
+  if (guides.normal) check_guide("the normal", *guides.normal);
+  if (guides.denoising_albedo) check_guide("the albedo behind glass", *guides.denoising_albedo);
+  if (guides.denoising_normal) check_guide("the normal behind glass", *guides.denoising_normal);
+  if (guides.position) check_guide("the position", *guides.position);
 }
 
 Guides network_guides(const Guides& guides) {

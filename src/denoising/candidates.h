@@ -66,11 +66,24 @@ enum class CandidateBase { kPair, kMean };
 /// NL-means of the image and of the image over its albedo; for a mean with albedo, regression.h in place of the former,
 /// or all three. The regression gains next to nothing if a network's candidates are mixed in too.
 enum class FilterKinds { kNlMeans, kRegression, kAll };
+/// Scales of differences of albedos and normals, and bandwidths of the sharp and the smooth filter.
+inline constexpr float kAlbedoUnit = 0.07f, kNormalUnit = 0.2f, kSharpBandwidth = 0.5f, kSmoothBandwidth = 1;
+/// What the regression fits the image to; nothing if it is not used, or if there is no albedo.
+struct RegressionGuides {
+  std::vector<const Image*> features;
+  const Image* position = nullptr;  ///< or null
+  bool nl_means = true;             ///< whether NL-means filters the image itself, too
+};
+RegressionGuides regression_guides(const Guides& guides, FilterKinds kinds);
+/// The names of filtered_candidates(), in order.
+std::vector<std::string> filter_names(const Guides& guides, CandidateBase base, FilterKinds kinds);
 /// Candidates without a network. The guides must outlive the result. `first_row`: of a larger image if these are rows
 /// of it, a multiple of kRegressionCell; kCandidateReach rows from those that are missing, the bits are those of the
 /// whole.
 CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base = CandidateBase::kPair,
                                    FilterKinds kinds = FilterKinds::kNlMeans, int first_row = 0);
+/// Throws Error(kInput) for auxiliary images with values that cannot be used (check_guide() of denoise.h).
+void check_guides(const Guides& guides);
 /// The guides for a neural network: those seen in mirrors and through glass, if available.
 Guides network_guides(const Guides& guides);
 

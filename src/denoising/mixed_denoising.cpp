@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "denoising/denoise.h"
 #include "denoising/layers.h"
+#include "denoising/mean_mixture.h"
 #include "denoising/mixed_rows.h"
 #include "denoising/mixture.h"
 #include "denoising/parts_mixture.h"
@@ -53,14 +54,6 @@ int runs_of(const std::vector<CandidateMaker>& makers) {
   int runs = 0;
   for (const CandidateMaker& maker : makers) runs += maker.runs ? maker.runs() : 0;
   return runs;
-}
-
-void check_guides(const Guides& guides) {
-  if (guides.albedo) check_guide("the albedo", *guides.albedo);
-  if (guides.normal) check_guide("the normal", *guides.normal);
-  if (guides.denoising_albedo) check_guide("the albedo behind glass", *guides.denoising_albedo);
-  if (guides.denoising_normal) check_guide("the normal behind glass", *guides.denoising_normal);
-  if (guides.position) check_guide("the position", *guides.position);
 }
 
 }  // namespace
@@ -180,8 +173,8 @@ MixedDenoising single_candidate(const GroupedImage& independent, const std::vect
   return out;
 }
 
-/// Shared by the image and its stages.
-using Run = std::function<MixedDenoising(const Samples& samples, const MethodSettings& settings)>;
+/// Shared by the image and its stages; `stages`: candidates and weights are wanted.
+using Run = std::function<MixedDenoising(const Samples& samples, const MethodSettings& settings, bool stages)>;
 
 /// denoise_by_mixture(), with the frame's guides applied to the history and kept for the next frame.
 MixedDenoising denoise_frame(DenoisingParts parts, const std::vector<CandidateMaker>& makers,
@@ -202,7 +195,7 @@ MixedDenoising denoise_frame(DenoisingParts parts, const std::vector<CandidateMa
 }
 
 Run run_of_pair(const Method& base, const MixedDenoisingOptions& options, bool with_oidn) {
-  return [=](const Samples& samples, const MethodSettings& settings) {
+  return [=](const Samples& samples, const MethodSettings& settings, bool /*stages*/) {
     check_guides(settings.guides);
     const auto& [crn, independent] = samples;
     if (std::min(crn.groups, independent.groups) < 2 * base.fewest_groups) {
@@ -231,15 +224,22 @@ FilterKinds kinds_for(double samples, bool with_network, const MixingHistory& hi
 }
 
 Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
-  return [=](const Samples& samples, const MethodSettings& settings) {
+  return [=](const Samples& samples, const MethodSettings& settings, bool stages) {
     const GroupedImage& independent = samples.independent;
     check_guides(settings.guides);
-    std::vector<CandidateMaker> makers;
-    if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn, CandidateBase::kMean));
     const FilterKinds kinds = kinds_for(mean_samples(independent), with_oidn, options.history);
-    makers.push_back(filtered_candidates(settings.guides, CandidateBase::kMean, kinds));
-    if (!can_be_mixed(independent)) return single_candidate(independent, makers, settings.layers);
-    return denoise_frame(parts_of_mean(independent), makers, options, settings, settings.layers);
+    const auto here = [&]() -> MixedDenoising {
+      std::vector<CandidateMaker> makers;
+      if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn, CandidateBase::kMean));
+      makers.push_back(filtered_candidates(settings.guides, CandidateBase::kMean, kinds));
+      if (!can_be_mixed(independent)) return single_candidate(independent, makers, settings.layers);
+      return denoise_frame(parts_of_mean(independent), makers, options, settings, settings.layers);
+    };
+    const bool has_history = options.history.before || options.history.keep_samples;
+    const bool is_plain = !with_oidn && settings.layers.empty() && !has_history && can_be_mixed(independent);
+    if (!options.mix_mean || !is_plain) return here();
+    const PartsWeighting weighting = settings_of(options.mode).weighting;
+    return options.mix_mean({independent, settings.guides, kinds, weighting, settings.std_error, stages}, here);
   };
 }
 
@@ -280,7 +280,7 @@ RowsMethod rows_of_pair(const Method& base) {
   };
   method.of_few = [run = run_of_pair(base, {}, false)](const Samples& rows, const MethodSettings& settings,
                                                        const std::vector<CandidateMaker>&) {
-    return run(rows, settings).result;
+    return run(rows, settings, false).result;
   };
   return method;
 }
@@ -317,18 +317,18 @@ std::string text_as(const char* name, const Method& base) { return name + base.t
 void set_image(const Method& base, const Run& run, Method& method) {
   if (base.is_mean())
     method.passes = OnePass{.image = [run](const GroupedImage& independent, const MethodSettings& settings) {
-      return run({{}, independent}, settings).result;
+      return run({{}, independent}, settings, false).result;
     }};
   else
     method.passes =
         PassPair{.image =
                      [run](const GroupedImage& crn, const GroupedImage& independent, const MethodSettings& settings) {
-                       return run({crn, independent}, settings).result;
+                       return run({crn, independent}, settings, false).result;
                      },
                  .needs_sample_count = base.pair()->needs_sample_count,
                  .explain = {}};
   method.stages = [run](const Samples& samples, const MethodSettings& settings) {
-    MixedDenoising all = run(samples, settings);
+    MixedDenoising all = run(samples, settings, true);
     std::map<std::string, Image> stages;
     for (size_t p = 0; p < all.names.size(); ++p) {
       stages["candidate-" + all.names[p]] = std::move(all.candidates[p]);

@@ -10,6 +10,7 @@
 // The error, including bias, is measured (held_out_error.h).
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -41,11 +42,17 @@ struct MixingHistory {
   bool keep_samples = false;              ///< fill EstimatorResult::kept_samples for the next frame
 };
 
+struct MeanMixture;     // mean_mixture.h
+struct MixedDenoising;  // below
+
 struct MixedDenoisingOptions {
   DenoiseMode mode = DenoiseMode::kBalanced;
   bool use_oidn = true;  ///< use Open Image Denoise if it is installed
   DenoiseOptions oidn;   ///< its library; it is an error if a given path has none
   MixingHistory history;
+  /// Makes the mixture of a mean without network, history and layers elsewhere, such as on a GPU, or by calling `here`;
+  /// empty: here.
+  std::function<MixedDenoising(const MeanMixture&, const std::function<MixedDenoising()>& here)> mix_mean;
 };
 
 /// A method that holds another, whose image it denoises: that of a pair that predicts its error, or the mean. For the

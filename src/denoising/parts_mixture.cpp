@@ -12,9 +12,8 @@
 namespace covary {
 namespace {
 
-/// For the mean: the factor of its variance in counts_of(), and MixtureInput::prior; both measured
-/// (docs/methods/denoising.md).
-constexpr float kCountOfVariance = 2, kPriorOfMean = 10;
+/// The factor of a mean's variance in counts_of(), measured (docs/methods/denoising.md).
+constexpr float kCountOfVariance = 2;
 
 /// Typical weights of a mean's candidates: those of least error with 16 samples if all pixels of all scenes have the
 /// same. Measured (docs/notes/denoising.md).

@@ -17,6 +17,9 @@ struct PartsWeighting {
   bool residual_correction = false;  ///< add it to the mixture, for pairs
 };
 
+/// MixtureInput::prior for the mean, measured (docs/methods/denoising.md).
+inline constexpr float kPriorOfMean = 10;
+
 struct MixedParts {
   CandidateSet whole;
   std::array<CandidateSet, 2> halves;

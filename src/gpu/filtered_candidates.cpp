@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gpu/filtered_candidates.h"
+
+#include "gpu/launch.h"
+
+namespace covary::gpu {
+namespace {
+
+Buffer<float> uploaded(Device& device, const Image* image) {
+  return image ? device.upload(std::span(image->data)) : Buffer<float>();
+}
+
+device::Kernel modulation(Device& device, const char* name) {
+  return device.kernel("modulation.cl", name, with_bug({}, false));
+}
+
+Buffer<float> demodulated(Device& device, const Buffer<float>& image, const Buffer<float>& albedo) {
+  auto result = device.make<float>(image.size());
+  device.launch(modulation(device, "demodulate"), list_of(image.size()), kOfList, image, albedo,
+                static_cast<int>(image.size()), result);
+  return result;
+}
+
+const Buffer<float>* or_null(const Buffer<float>& buffer) { return buffer ? &buffer : nullptr; }
+
+}  // namespace
+
+GuideBuffers::GuideBuffers(Device& device, const Guides& guides, FilterKinds kinds)
+    : albedo_(uploaded(device, guides.albedo)),
+      normal_(uploaded(device, guides.normal)),
+      albedo_behind_(uploaded(device, guides.denoising_albedo)),
+      normal_behind_(uploaded(device, guides.denoising_normal)) {
+  const RegressionGuides regression = regression_guides(guides, kinds);
+  nl_means_ = regression.nl_means;
+  if (regression.features.empty()) return;
+  const Buffer<float> position = uploaded(device, regression.position);
+  std::vector<Buffer<float>> images;
+  std::vector<const Buffer<float>*> pointers;
+  for (const Image* feature : regression.features) images.push_back(uploaded(device, feature));
+  for (const Buffer<float>& image : images) pointers.push_back(&image);
+  features_ = features_of(device, pointers, or_null(position));
+}
+
+SurfaceBuffers GuideBuffers::surfaces() const {
+  return {or_null(normal_), or_null(normal_behind_), or_null(albedo_), or_null(albedo_behind_)};
+}
+
+void filter(Device& device, const Groups& groups, const GuideBuffers& guides, const PartBuffers& part, bool is_half,
+            const Place& results) {
+  const size_t values = 3 * static_cast<size_t>(groups.pixels());
+  size_t next = results.first + (guides.features() ? values : 0);  // the regression is the first
+  NlMeansInput input{groups.width, groups.height, &part.noisy(), &part.noisy_error(), &groups.valid};
+  if (guides.nl_means()) {
+    if (guides.albedo()) input.guides.push_back({guides.albedo(), kAlbedoUnit});
+    if (guides.normal()) input.guides.push_back({guides.normal(), kNormalUnit});
+    input.bandwidths = {kSharpBandwidth, kSmoothBandwidth};
+    const std::array places = {Place{results.buffer, next}, Place{results.buffer, next + values}};
+    gpu::nl_means(device, input, places);
+    next += 2 * values;
+  }
+  if (!guides.albedo()) return;
+  const Buffer<float> image = demodulated(device, part.noisy(), *guides.albedo());
+  const Buffer<float> error = demodulated(device, part.noisy_error(), *guides.albedo());
+  const auto clean = device.make<float>(values);
+  input.image = &image, input.std_error = &error;
+  input.guides.clear();
+  if (guides.normal()) input.guides.push_back({guides.normal(), kNormalUnit});
+  input.bandwidths = {kSharpBandwidth};
+  gpu::nl_means(device, input, {{Place{&clean}}});
+  device.launch(modulation(device, "modulate"), list_of(values), kOfList, clean, *guides.albedo(),
+                static_cast<int>(values), static_cast<int>(next), *results.buffer);
+  if (!guides.features()) return;
+  regressed(device,
+            {.width = groups.width,
+             .height = groups.height,
+             .image = &part.noisy(),
+             .std_error = &part.noisy_error(),
+             .valid = &groups.valid,
+             .features = guides.features(),
+             .other = {results.buffer, next},
+             .coarse = is_half},
+            *results.buffer);
+}
+
+}  // namespace covary::gpu

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gpu/mixed_denoising.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <utility>
+
+#include "denoising/mixed_rows.h"
+#include "gpu/denoising_parts.h"
+#include "gpu/filtered_candidates.h"
+#include "gpu/held_out.h"
+#include "gpu/mixture.h"
+
+namespace covary::gpu {
+namespace {
+
+class MeanDenoising {
+ public:
+  MeanDenoising(Device& device, const MeanMixture& request)
+      : device_(device),
+        request_(request),
+        groups_(upload(device, request.independent)),
+        guides_(device, request.guides, request.kinds),
+        parts_(parts_of_mean(device, groups_)) {}
+
+  MixedDenoising run() {
+    make_candidates();
+    const MixtureBuffers input = mixture_input();
+    const MixedBuffers mixed = mix(device_, input, [&](const std::vector<NormalRow>& rows) {
+      return weights_of_whole(true, makers_, request_.weighting, mean_samples(request_.independent), rows);
+    });
+    MixedDenoising out;
+    out.names = names_of(makers_);
+    out.result = finish(rows_of(input, mixed), makers_, "mean");
+    if (!request_.stages) return out;
+    out.weights = downloaded_images(mixed.weights, 1);
+    out.candidates = downloaded_images(candidates_[0], 3);
+    return out;
+  }
+
+ private:
+  size_t pixels() const { return static_cast<size_t>(groups_.pixels()); }
+
+  void make_candidates() {
+    makers_.resize(1);  // tells the names
+    makers_[0].names = filter_names(request_.guides, CandidateBase::kMean, request_.kinds);
+    n_candidates_ = static_cast<int>(names_of(makers_).size());
+    for (size_t i = 0; i < parts_.size(); ++i) {
+      candidates_[i] = device_.make<float>(3 * pixels() * n_candidates_);
+      filter(device_, groups_, guides_, parts_[i], i > 0, {&candidates_[i], 0});
+    }
+  }
+
+  MixtureBuffers mixture_input() {
+    MixtureBuffers in;
+    in.width = groups_.width, in.height = groups_.height, in.candidates = n_candidates_;
+    in.whole = {&parts_[0].independent.mean, &candidates_[0]};
+    for (const int half : {0, 1}) {
+      const PartBuffers& part = parts_[half + 1];
+      in.halves[half] = {&part.independent.mean, &candidates_[half + 1]};
+      in.independent[half] = &part.independent.mean;
+      counts_[half] = error_weights(device_, candidates_[half + 1], part.std_error);
+      in.counts[half] = &counts_[half];
+    }
+    in.valid = &groups_.valid;
+    in.bias_share = request_.weighting.bias_share;
+    in.prior = kPriorOfMean;
+    return in;
+  }
+
+  /// What mixed_rows() of denoising/mixed_rows.h makes.
+  MixedRows rows_of(const MixtureBuffers& input, const MixedBuffers& mixed) {
+    MixedRows rows;
+    rows.result.estimate = downloaded(mixed.image, 3);
+    const std::vector<unsigned char> valid = device_.download(groups_.valid);
+    rows.result.nonfinite_pixels = std::count(valid.begin(), valid.end(), 0);
+    rows.result.risk_kind = has_network(makers_) ? ErrorKind::kNetwork : ErrorKind::kFilters;
+    if (!request_.std_error) return rows;
+    HeldOutBuffers held_out{groups_.width,   groups_.height, {Place{&mixed.halves[0]}, Place{&mixed.halves[1]}}, {},
+                            &candidates_[0], &groups_.valid};
+    for (const int half : {0, 1}) held_out.independent[half] = &parts_[half + 1].independent;
+    rows.error = held_out_parts(device_, held_out);
+    rows.disagreement = downloaded(disagreement(device_, input, mixed.image), 1);
+    rows.result.bias = held_out_bias(device_, held_out, {&candidates_[1], &candidates_[2]});
+    rows.result.risk_rows =
+        image_risk(device_, held_out, mixed.image, parts_[0].independent, groups_, guides_.surfaces());
+    for (const auto& [error, n] : base_rows(device_, held_out, parts_[0].std_error)) rows.of_base.push_back({error, n});
+    for (int p = 0; p < n_candidates_; ++p) {
+      const size_t first = 3 * pixels() * p;
+      held_out.halves = {Place{&candidates_[1], first}, Place{&candidates_[2], first}};
+      rows.of_candidates.push_back(held_out_rows(device_, held_out));
+    }
+    return rows;
+  }
+
+  Image downloaded(const Buffer<float>& buffer, int channels, size_t first = 0) {
+    Image image(groups_.width, groups_.height, channels);
+    device_.read(buffer, image.data, first);
+    return image;
+  }
+  std::vector<Image> downloaded_images(const Buffer<float>& buffer, int channels) {
+    std::vector<Image> images;
+    for (int p = 0; p < n_candidates_; ++p) images.push_back(downloaded(buffer, channels, pixels() * channels * p));
+    return images;
+  }
+
+  Device& device_;
+  const MeanMixture& request_;
+  Groups groups_;
+  GuideBuffers guides_;
+  std::array<PartBuffers, 3> parts_;
+  std::vector<CandidateMaker> makers_;
+  int n_candidates_ = 0;
+  std::array<Buffer<float>, 3> candidates_;
+  std::array<Buffer<float>, 2> counts_;
+};
+
+}  // namespace
+
+MixedDenoising mix_mean(Device& device, const MeanMixture& request) { return MeanDenoising(device, request).run(); }
+
+}  // namespace covary::gpu

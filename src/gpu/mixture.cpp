@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gpu/mixture.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "gpu/launch.h"
+
+namespace covary::gpu {
+namespace {
+
+constexpr int kCell = 4;        // as in kernels/mixture.cl
+constexpr int kPartOfRow = 64;  // pixels whose normal equations an item adds
+
+device::Kernel kernel(Device& device, const char* name, int candidates, bool planted_bug = false) {
+  return device.kernel("mixture.cl", name, with_bug({fmt::format("M={}", candidates)}, planted_bug));
+}
+
+int cells_in(int pixels) { return (pixels + kCell - 1) / kCell; }
+
+/// The normal equations of the rows that determine the weights of the whole image.
+std::vector<NormalRow> sampled_normal_rows(Device& device, const MixtureBuffers& in) {
+  const int n_sums = n_normal_sums(in.candidates), n_parts = (in.width + kPartOfRow - 1) / kPartOfRow;
+  std::vector<NormalRow> rows;
+  for (const auto& [first, end] : sampled_rows(in.width, in.height)) {
+    const int n = end - first;
+    const auto parts = device.make<float>(static_cast<size_t>(n) * n_parts * n_sums);
+    device.launch(kernel(device, "normal_parts", in.candidates, in.planted_bug), image_of(n_parts, n), kOfImage,
+                  *in.halves[0].base, *in.halves[1].base, *in.halves[0].candidates, *in.halves[1].candidates,
+                  *in.independent[0], *in.independent[1], *in.counts[0], *in.counts[1], *in.valid, in.bias_share,
+                  in.width, in.height, first, n, kPartOfRow, parts);
+    const std::vector<float> sums = device.download(parts);
+    for (int y = 0; y < n; ++y) {
+      NormalRow& row = rows.emplace_back();
+      for (int part = 0; part < n_parts; ++part)
+        for (int k = 0; k < n_sums; ++k)
+          row[static_cast<size_t>(k)] += sums[(static_cast<size_t>(y) * n_parts + part) * n_sums + k];
+    }
+  }
+  return rows;
+}
+
+Buffer<float> mixed(Device& device, const MixtureBuffers& in, const CandidateBuffers& set,
+                    const Buffer<float>& weights) {
+  auto result = device.make<float>(set.base->size());
+  const int pixels = in.width * in.height;
+  device.launch(kernel(device, "mix_candidates", in.candidates), list_of(static_cast<size_t>(pixels)), kOfList,
+                *set.base, *set.candidates, weights, *in.valid, pixels, result);
+  return result;
+}
+
+}  // namespace
+
+Buffer<float> error_weights(Device& device, const Buffer<float>& guide, const Buffer<float>& std_error) {
+  const size_t pixels = std_error.size() / 3;
+  auto result = device.make<float>(pixels);
+  device.launch(kernel(device, "error_weights", 1), list_of(pixels), kOfList, guide, std_error,
+                static_cast<int>(pixels), result);
+  return result;
+}
+
+MixedBuffers mix(Device& device, const MixtureBuffers& in,
+                 const std::function<std::vector<float>(const std::vector<NormalRow>&)>& everywhere) {
+  COVARY_CHECK(in.candidates >= 1 && in.candidates <= kMostCandidates, "between one and kMostCandidates candidates");
+  const int columns = cells_in(in.width), rows = cells_in(in.height), m = in.candidates;
+  const Buffer<float>& guide = *in.whole.candidates;
+  const auto cells = device.make<float>(static_cast<size_t>(columns) * rows * (3 + n_normal_sums(m)));
+  device.launch(kernel(device, "normal_cells", m, in.planted_bug), image_of(columns, rows), kOfImage, guide,
+                *in.halves[0].base, *in.halves[1].base, *in.halves[0].candidates, *in.halves[1].candidates,
+                *in.independent[0], *in.independent[1], *in.counts[0], *in.counts[1], *in.valid, in.bias_share,
+                in.width, in.height, cells);
+  std::vector<float> prior(static_cast<size_t>(m));
+  if (in.prior > 0) {
+    prior = everywhere(sampled_normal_rows(device, in));
+    prior.resize(static_cast<size_t>(m));
+  }
+  const Buffer<float> of_whole = device.upload(std::span(std::as_const(prior)));
+  MixedBuffers result;
+  result.weights = device.make<float>(static_cast<size_t>(m) * in.width * in.height);
+  device.launch(kernel(device, "mixture_weights", m), image_of(in.width, in.height), kOfImage, cells, guide, of_whole,
+                in.prior, in.width, in.height, result.weights);
+  result.image = mixed(device, in, in.whole, result.weights);
+  for (const int half : {0, 1}) result.halves[half] = mixed(device, in, in.halves[half], result.weights);
+  return result;
+}
+
+Buffer<float> disagreement(Device& device, const MixtureBuffers& in, const Buffer<float>& mixture) {
+  auto result = device.make<float>(static_cast<size_t>(in.width) * in.height);
+  device.launch(kernel(device, "disagreement", in.candidates), image_of(in.width, in.height), kOfImage,
+                *in.whole.candidates, *in.whole.candidates, mixture, *in.valid, in.width, in.height, result);
+  return result;
+}
+
+void limit_by_network(Device& device, const MixtureBuffers& in, const Buffer<float>& estimate,
+                      const Buffer<float>& std_error, const Buffer<float>& candidates) {
+  device.launch(kernel(device, "limit_by_network", in.candidates), image_of(in.width, in.height), kOfImage, estimate,
+                std_error, in.width, in.height, candidates);
+}
+
+}  // namespace covary::gpu

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// denoising/mixture.h on a device: weights of candidates by cross-validation, and their mixture.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <vector>
+
+#include "denoising/mixture.h"
+#include "device/device.h"
+
+namespace covary::gpu {
+
+using device::Buffer;
+using device::Device;
+
+/// F and its candidates C_p, one image after another.
+struct CandidateBuffers {
+  const Buffer<float>* base = nullptr;
+  const Buffer<float>* candidates = nullptr;
+};
+
+struct MixtureBuffers {
+  int width = 0, height = 0;
+  int candidates = 0;  ///< their number M
+  CandidateBuffers whole;
+  std::array<CandidateBuffers, 2> halves;
+  std::array<const Buffer<float>*, 2> independent = {};  ///< h_A, h_B
+  std::array<const Buffer<float>*, 2> counts = {};       ///< weights of squared errors (error_weights())
+  const Buffer<unsigned char>* valid = nullptr;
+  float bias_share = 1;
+  float prior = 0;
+  bool planted_bug = false;
+};
+
+/// MixtureInput::counts of a half: weights of squared errors by an image with little noise, and the standard error.
+Buffer<float> error_weights(Device& device, const Buffer<float>& guide, const Buffer<float>& std_error);
+
+/// What mix() makes: images of three channels, and M weights of one channel.
+struct MixedBuffers {
+  Buffer<float> image, weights;
+  std::array<Buffer<float>, 2> halves;
+};
+/// `everywhere`: the weights of the whole image, from the normal equations of its rows. The first candidate of all
+/// samples is the guide.
+MixedBuffers mix(Device& device, const MixtureBuffers& in,
+                 const std::function<std::vector<float>(const std::vector<NormalRow>&)>& everywhere);
+
+/// How much the candidates differ from the mixture (denoising/mixture.h).
+Buffer<float> disagreement(Device& device, const MixtureBuffers& in, const Buffer<float>& mixture);
+
+/// Limits the brightness of all candidates of a part but the first, a network's image.
+void limit_by_network(Device& device, const MixtureBuffers& in, const Buffer<float>& estimate,
+                      const Buffer<float>& std_error, const Buffer<float>& candidates);
+
+}  // namespace covary::gpu
