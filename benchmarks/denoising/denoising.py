@@ -24,7 +24,7 @@ from layers import read_image  # noqa: E402
 
 REFERENCE_SEEDS = (1001, 1002)
 #: In the order of columns; "oidn" is what the others are compared with.
-METHODS = ("path tracing", "iicv", "oidn", "auto", "own filters")
+METHODS = ("path tracing", "iicv", "oidn", "oidn first surface", "auto", "own filters")
 
 
 def turned_cameras():
@@ -111,9 +111,10 @@ class Scene:
         guides = self.render("guides", 2, 1, "--estimator", "none", "--denoise", "none", "--aovs")  # of any seed
         output = self.folder / f"{method.replace(' ', '-')}-{spp}-{seed}.exr"
         output.unlink(missing_ok=True)
-        if method == "oidn":
-            self.run("denoise", film, "--mode", "oidn", "--clean-guides", "--albedo", "DenoisingAlbedo", "--normal",
-                     "DenoisingNormal", "--quiet", "-o", output)
+        if method.startswith("oidn"):
+            albedo, normal = ("DenoisingAlbedo", "DenoisingNormal") if method == "oidn" else ("Albedo", "N")
+            self.run("denoise", film, "--mode", "oidn", "--clean-guides", "--albedo", albedo, "--normal", normal,
+                     "--quiet", "-o", output)
         else:
             self.run("combine", "--independent", film, "--guides", guides, "--denoise", "auto", "--quiet", "-o", output,
                      *(["--oidn", "off"] if method == "own filters" else []))
