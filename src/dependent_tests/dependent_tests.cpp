@@ -85,13 +85,13 @@ Planes noise_of_means(const GroupedImage& crn, const GroupedImage& independent) 
 
 /// Writes the mixture of least measured error to pixels that have independent samples.
 void mix(const GroupedImage& crn, const GroupedImage& independent, const std::vector<unsigned char>& valid,
-         const DependentTestsOptions& options, const FilterInput& input, const FilteredImage& filtered,
-         const Planes* scale, Image& result) {
+         const DependentTestsOptions& options, const DependentFilters& filters, const FilterInput& input,
+         const FilteredImage& filtered, const Planes* scale, Image& result) {
   const Image dependent = image_of(input.dependent);
   std::vector<MixtureCandidate> candidates = {{&dependent, nullptr}, {&filtered.colour, &filtered.centre_weight}};
   std::optional<FilteredImage> narrow;
   if (options.filter == DependentFilter::kExact && options.window > 3) {
-    narrow.emplace(bound_filter(input, 3, scale));
+    narrow.emplace(filters.bound(input, 3, scale));
     candidates.push_back({&narrow->colour, &narrow->centre_weight});
   }
   const Image mixture =
@@ -113,17 +113,17 @@ void check(const GroupedImage& crn, const GroupedImage& independent, std::vector
 /// Processes two whole images at once; pixels with valid = 0 are ignored.
 Image filter_and_combine(const GroupedImage& crn, const GroupedImage& independent,
                          const std::vector<unsigned char>& valid, const DependentTestsOptions& options,
-                         DependentTestsStages* stages) {
+                         const DependentFilters& filters, DependentTestsStages* stages) {
   const bool exact = options.filter == DependentFilter::kExact;
   const int border = exact ? options.window / 2 : options.regions.max_region;
   const FilterInput input = filter_input(crn, independent, valid, options.variance, options.smoothing, border);
   std::optional<Planes> scale;
   if (exact && options.guard > 0) scale = difference_scale(input, valid, options.guard);
   FilteredImage filtered =
-      exact ? bound_filter(input, options.window, scale ? &*scale : nullptr) : region_filter(input, options.regions);
+      exact ? filters.bound(input, options.window, scale ? &*scale : nullptr) : filters.region(input, options.regions);
   Image estimate = combine(crn, input, filtered, options.weights);
   if (options.weights == CombinationWeights::kMeasured)
-    mix(crn, independent, valid, options, input, filtered, scale ? &*scale : nullptr, estimate);
+    mix(crn, independent, valid, options, filters, input, filtered, scale ? &*scale : nullptr, estimate);
   fill_invalid(crn, independent, valid, estimate);
   if (!stages) return estimate;
   *stages = {{"dependent", image_of(input.dependent)},
@@ -171,7 +171,8 @@ bool in_range(const DependentTestsOptions& o) {
 }  // namespace
 
 EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& independent,
-                                const DependentTestsOptions& options, DependentTestsStages* stages) {
+                                const DependentTestsOptions& options, DependentTestsStages* stages,
+                                const DependentFilters& filters) {
   COVARY_CHECK(in_range(options), "options of dependent-tests are in the ranges that dependent_tests.h states");
   std::vector<std::string> problems;
   check(crn, independent, problems);
@@ -182,7 +183,7 @@ EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& ind
   EstimatorResult result;
   const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
   if (stages || step >= height) {
-    result.estimate = filter_and_combine(crn, independent, valid, options, stages);
+    result.estimate = filter_and_combine(crn, independent, valid, options, filters, stages);
     return result;
   }
   result.estimate = Image(width, height, 3);
@@ -190,9 +191,9 @@ EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& ind
     const int own = std::min(step, height - y), first = std::max(0, y - reach);
     const int rows = std::min(height, y + own + reach) - first;
     const auto valid_rows = valid.begin() + static_cast<std::ptrdiff_t>(first) * width;
-    const Image band =
-        filter_and_combine(rows_of(crn, first, rows), rows_of(independent, first, rows),
-                           {valid_rows, valid_rows + static_cast<std::ptrdiff_t>(rows) * width}, options, nullptr);
+    const Image band = filter_and_combine(rows_of(crn, first, rows), rows_of(independent, first, rows),
+                                          {valid_rows, valid_rows + static_cast<std::ptrdiff_t>(rows) * width}, options,
+                                          filters, nullptr);
     std::copy_n(band.pixel(0, y - first), 3 * static_cast<size_t>(width) * own, result.estimate.pixel(0, y));
   }
   return result;
@@ -227,17 +228,21 @@ void declare(Settings& p, DependentTestsOptions& o) {
 
 }  // namespace
 
-Method make_dependent_tests(Settings& p) {
+DeclaredDependentTests declare_dependent_tests(Settings& p) {
   const bool paper = p.flag("paper", "dependent-tests as published: its filter, weights and allocation",
                             {.effect = OptionEffect::kPasses});
-  DependentTestsOptions o = paper ? DependentTestsOptions::paper() : DependentTestsOptions();
-  AdaptiveSampling adaptive;
-  if (paper) adaptive.counts.allocation = Allocation::kEqualError, adaptive.counts.min_spp = 0;
-  if (paper) adaptive.counts.smoothing = 1;
-  adaptive.counts.classes = paper;
-  ask_for(p, adaptive);
-  declare(p, o);
+  DeclaredDependentTests declared;
+  if (paper) declared.filter = DependentTestsOptions::paper();
+  CountOptions& counts = declared.adaptive.counts;
+  if (paper) counts.allocation = Allocation::kEqualError, counts.min_spp = 0, counts.smoothing = 1;
+  counts.classes = paper;
+  ask_for(p, declared.adaptive);
+  declare(p, declared.filter);
+  return declared;
+}
 
+Method make_dependent_tests(Settings& p) {
+  const auto [o, adaptive] = declare_dependent_tests(p);
   Method estimator;
   estimator.summary = "dependent tests driven filtering";
   estimator.fewest_groups = 2;
@@ -245,10 +250,10 @@ Method make_dependent_tests(Settings& p) {
   estimator.reach = dependent_tests_reach(o);
   estimator.memory.always = kDependentTestsBytesPerPixel;
   estimator.memory.largest_part = kDependentTestsBand;
-  estimator.passes = PassPair{.image = [o](const GroupedImage& crn, const GroupedImage& independent,
-                                           const MethodSettings&) { return dependent_tests(crn, independent, o); },
+  estimator.passes = PassPair{.image = [o = o](const GroupedImage& crn, const GroupedImage& independent,
+                                               const MethodSettings&) { return dependent_tests(crn, independent, o); },
                               .explain = {}};
-  estimator.stages = [o](const Samples& samples, const MethodSettings&) {
+  estimator.stages = [o = o](const Samples& samples, const MethodSettings&) {
     DependentTestsStages stages;
     dependent_tests(samples.crn, samples.independent, o, &stages);
     return stages;

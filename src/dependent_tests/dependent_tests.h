@@ -15,12 +15,14 @@
 // from an image that is part of the average favour its low values.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 
 #include "dependent_tests/bound_filter.h"
 #include "dependent_tests/region_filter.h"
 #include "estimators/estimator_result.h"
+#include "estimators/sample_counts.h"
 #include "film/grouped_image.h"
 #include "filters/filter_input.h"
 
@@ -58,6 +60,12 @@ struct DependentTestsOptions {
   static DependentTestsOptions paper();
 };
 
+/// Where the filters run, such as on a GPU (gpu/dependent_filters.h); otherwise here.
+struct DependentFilters {
+  std::function<FilteredImage(const FilterInput&, const RegionOptions&)> region = region_filter;
+  std::function<FilteredImage(const FilterInput&, int window, const Planes* difference_scale)> bound = bound_filter;
+};
+
 /// Intermediate results of dependent_tests(): the images of [Csonka2002] Fig. 2 (`dependent`, `independent`,
 /// `filtered`, `combined`) and, with one channel each, `samples` of the independent image, number of pixels in the
 /// `region`, `centre_weight` and error `bound`, which is infinite where no pixel has samples.
@@ -68,7 +76,8 @@ using DependentTestsStages = std::map<std::string, Image>;
 /// must have the same size, and the CRN image two groups or the variance of its samples. Bit-identical for any number
 /// of threads.
 EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& independent,
-                                const DependentTestsOptions& options = {}, DependentTestsStages* stages = nullptr);
+                                const DependentTestsOptions& options = {}, DependentTestsStages* stages = nullptr,
+                                const DependentFilters& filters = {});
 
 /// Radius of influence of the input on a pixel, in rows or columns.
 int dependent_tests_reach(const DependentTestsOptions& options);
@@ -78,6 +87,13 @@ inline constexpr double kDependentTestsBytesPerPixel = 4.0 * (3 + 3 + 2 + 2 + 7 
 /// Without stages, large images are processed in bands of rows, with the bits of the whole: at most this many bytes
 /// beyond input and result, unless 64 rows and their surroundings need more.
 inline constexpr double kDependentTestsBand = 48e6;
+
+/// The options of make_dependent_tests(), declared to `settings`. Throws Error(kUsage) likewise.
+struct DeclaredDependentTests {
+  DependentTestsOptions filter;
+  AdaptiveSampling adaptive;
+};
+DeclaredDependentTests declare_dependent_tests(Settings& settings);
 
 inline constexpr const char* kDependentTests = "dependent-tests";
 /// The estimator `dependent-tests` with these options. Throws Error(kUsage) listing everything wrong with them.

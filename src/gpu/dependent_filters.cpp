@@ -77,4 +77,16 @@ FilteredImage bound_filter(Device& device, const FilterInput& input, int window,
   return result.download(device, input);
 }
 
+EstimatorResult dependent_tests(Device& device, const GroupedImage& crn, const GroupedImage& independent,
+                                const DependentTestsOptions& options) {
+  DependentFilters filters;
+  filters.region = [&](const FilterInput& input, const RegionOptions& regions) {
+    return gpu::region_filter(device, input, regions);
+  };
+  filters.bound = [&](const FilterInput& input, int window, const Planes* difference_scale) {
+    return gpu::bound_filter(device, input, window, difference_scale);
+  };
+  return covary::dependent_tests(crn, independent, options, nullptr, filters);
+}
+
 }  // namespace covary::gpu

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "dependent_tests/bound_filter.h"
+#include "dependent_tests/dependent_tests.h"
 #include "dependent_tests/region_filter.h"
 #include "device/device.h"
 
@@ -14,5 +15,9 @@ FilteredImage region_filter(device::Device& device, const FilterInput& input, co
                             bool planted_bug = false);
 FilteredImage bound_filter(device::Device& device, const FilterInput& input, int window,
                            const Planes* difference_scale = nullptr, bool planted_bug = false);
+
+/// dependent_tests() with its filters on a device.
+EstimatorResult dependent_tests(device::Device& device, const GroupedImage& crn, const GroupedImage& independent,
+                                const DependentTestsOptions& options);
 
 }  // namespace covary::gpu

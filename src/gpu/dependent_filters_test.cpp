@@ -73,5 +73,16 @@ TEST(GpuBoundFilter, NoticesABug) {
   EXPECT_FALSE(same(covary::bound_filter(input, 11), bound_filter(test_device(), input, 11, nullptr, true)));
 }
 
+TEST(GpuDependentTests, AreThoseOfTheProcessor) {
+  const test::Grouped crn = test::crn_image(kWidth, kHeight, 8, 5),
+                      independent = test::independent_image(kWidth, kHeight, 8, 6);
+  for (const DependentTestsOptions& options : {DependentTestsOptions(), DependentTestsOptions::paper()}) {
+    const EstimatorResult expected = covary::dependent_tests(crn.view(), independent.view(), options);
+    const EstimatorResult found = gpu::dependent_tests(test_device(), crn.view(), independent.view(), options);
+    EXPECT_TRUE(agree(expected.estimate.data, found.estimate.data));
+    EXPECT_NE(expected.estimate.data, found.estimate.data);
+  }
+}
+
 }  // namespace
 }  // namespace covary::gpu

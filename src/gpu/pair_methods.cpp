@@ -3,6 +3,7 @@
 
 #include "estimators/iicv_steps.h"
 #include "gpu/control_variates.h"
+#include "gpu/dependent_filters.h"
 
 namespace covary::gpu {
 namespace {
@@ -18,7 +19,7 @@ ImageOfPair on_target(const std::shared_ptr<Target>& target, const ImageOfPair& 
     return target->run(
         [&](Device& device) -> MethodImage {
           Options own = options;
-          own.std_error = settings.std_error;
+          if constexpr (requires { own.std_error; }) own.std_error = settings.std_error;
           return work(device, crn, independent, own);
         },
         [&] { return image(crn, independent, settings); });
@@ -27,7 +28,7 @@ ImageOfPair on_target(const std::shared_ptr<Target>& target, const ImageOfPair& 
 
 }  // namespace
 
-std::vector<std::string> device_methods() { return {kIicv, kCvBaseline}; }
+std::vector<std::string> device_methods() { return {kIicv, kCvBaseline, kDependentTests}; }
 
 void put_on(const std::shared_ptr<Target>& target, const OptionValues& options, Method& method) {
   Settings values(options);
@@ -37,6 +38,9 @@ void put_on(const std::shared_ptr<Target>& target, const OptionValues& options, 
   else if (method.name == kCvBaseline)
     pair->image =
         on_target(target, pair->image, declare_cv_baseline(values), [](auto&&... a) { return cv_baseline(a...); });
+  else if (method.name == kDependentTests)
+    pair->image = on_target(target, pair->image, declare_dependent_tests(values).filter,
+                            [](auto&&... a) { return dependent_tests(a...); });
 }
 
 }  // namespace covary::gpu
