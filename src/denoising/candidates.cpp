@@ -17,8 +17,6 @@ namespace {
 
 /// The smallest albedo to divide by.
 constexpr float kLeastAlbedo = 0.02f;
-/// Residual correction in two widths (residual_correction.h).
-constexpr ResidualOptions kWideResidual = {0.5f, 61, 4}, kNarrowResidual = {0.3f, 41, 2};
 
 /// Copies an image's channels, divided by `unit`, to the planes from index `first` on.
 void copy_guide(const Image& image, float unit, int first, Planes& planes) {
@@ -168,8 +166,8 @@ void denoise_all(GuidedNetwork& network, std::span<Image> images) {
 std::vector<Image> with_residuals(const CandidateInput& in, const Image& clean, bool with_residual) {
   std::vector<Image> images(with_residual ? 3 : 1, clean);
   if (!with_residual) return images;
-  add_residual(*in.moments, kWideResidual, *in.valid, images[1]);
-  add_residual(*in.moments, kNarrowResidual, *in.valid, images[2]);
+  add_residual(*in.moments, kNetworkResiduals[0], *in.valid, images[1]);
+  add_residual(*in.moments, kNetworkResiduals[1], *in.valid, images[2]);
   return images;
 }
 
@@ -186,6 +184,15 @@ CandidateMaker::Make one_by_one(std::function<std::vector<Image>(const Candidate
     for (const CandidateInput& in : inputs) all.push_back(make(in));
     return all;
   };
+}
+
+FilterKinds kinds_for(double samples, bool with_network, bool with_history) {
+  // Without a network, from so many samples per pixel on, NL-means of the image itself is worth its time beside the
+  // regression; measured (docs/notes/denoising.md). With history it always is: candidates that differ show how wrong a
+  // frame is, which limits what previous frames may change (docs/notes/sequences.md).
+  constexpr double kManySamples = 64;
+  if (with_network) return FilterKinds::kNlMeans;
+  return samples >= kManySamples || with_history ? FilterKinds::kAll : FilterKinds::kRegression;
 }
 
 RegressionGuides regression_guides(const Guides& guides, FilterKinds kinds) {

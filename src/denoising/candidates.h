@@ -23,6 +23,7 @@
 #include "denoising/denoise.h"
 #include "estimators/method.h"
 #include "filters/planes.h"
+#include "filters/residual_correction.h"
 
 namespace covary {
 
@@ -66,6 +67,8 @@ enum class CandidateBase { kPair, kMean };
 /// NL-means of the image and of the image over its albedo; for a mean with albedo, regression.h in place of the former,
 /// or all three. The regression gains next to nothing if a network's candidates are mixed in too.
 enum class FilterKinds { kNlMeans, kRegression, kAll };
+/// Those for a mean of so many samples per pixel, with or without a network and previous frames.
+FilterKinds kinds_for(double samples, bool with_network, bool with_history = false);
 /// Scales of differences of albedos and normals, and bandwidths of the sharp and the smooth filter.
 inline constexpr float kAlbedoUnit = 0.07f, kNormalUnit = 0.2f, kSharpBandwidth = 0.5f, kSmoothBandwidth = 1;
 /// What the regression fits the image to; nothing if it is not used, or if there is no albedo.
@@ -86,6 +89,9 @@ CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base = Ca
 void check_guides(const Guides& guides);
 /// The guides for a neural network: those seen in mirrors and through glass, if available.
 Guides network_guides(const Guides& guides);
+
+/// Residual correction of a network's image in two widths.
+inline constexpr std::array<ResidualOptions, 2> kNetworkResiduals = {{{0.5f, 61, 4}, {0.3f, 41, 2}}};
 
 /// The images of a neural network: of all samples, averaged with those of the halves, and of both halves.
 struct NetworkImages {

@@ -3,6 +3,9 @@
 // processor: what it is made of.
 #pragma once
 
+#include <array>
+#include <functional>
+
 #include "denoising/candidates.h"
 #include "denoising/parts_mixture.h"
 #include "film/grouped_image.h"
@@ -14,6 +17,8 @@ struct MeanMixture {
   Guides guides;
   FilterKinds kinds = FilterKinds::kRegression;
   PartsWeighting weighting;
+  /// A network's images, whose candidates come first: of all samples and of both halves; empty: without one.
+  std::function<NetworkImages(std::array<Image, 3> noisy)> network;
   bool std_error = false;  ///< estimate the result's error
   bool stages = false;     ///< candidates and weights are wanted, too
 };

@@ -212,22 +212,13 @@ Run run_of_pair(const Method& base, const MixedDenoisingOptions& options, bool w
   };
 }
 
-/// Without a network, from so many samples per pixel on, NL-means of the image itself is worth its time beside the
-/// regression; measured (docs/notes/denoising.md). With history it always is: candidates that differ show how wrong a
-/// frame is, which limits what previous frames may change (docs/notes/sequences.md).
-constexpr double kManySamples = 64;
-
-FilterKinds kinds_for(double samples, bool with_network, const MixingHistory& history) {
-  if (with_network) return FilterKinds::kNlMeans;
-  const bool worth_it = samples >= kManySamples || history.before;
-  return worth_it ? FilterKinds::kAll : FilterKinds::kRegression;
-}
+constexpr const char* kMixedHere = "layers, history and pictures of very few samples are denoised on the processor";
 
 Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
   return [=](const Samples& samples, const MethodSettings& settings, bool stages) {
     const GroupedImage& independent = samples.independent;
     check_guides(settings.guides);
-    const FilterKinds kinds = kinds_for(mean_samples(independent), with_oidn, options.history);
+    const FilterKinds kinds = kinds_for(mean_samples(independent), with_oidn, options.history.before != nullptr);
     const auto here = [&]() -> MixedDenoising {
       std::vector<CandidateMaker> makers;
       if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn, CandidateBase::kMean));
@@ -235,11 +226,20 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
       if (!can_be_mixed(independent)) return single_candidate(independent, makers, settings.layers);
       return denoise_frame(parts_of_mean(independent), makers, options, settings, settings.layers);
     };
+    if (!options.mix_mean) return here();
     const bool has_history = options.history.before || options.history.keep_samples;
-    const bool is_plain = !with_oidn && settings.layers.empty() && !has_history && can_be_mixed(independent);
-    if (!options.mix_mean || !is_plain) return here();
-    const PartsWeighting weighting = settings_of(options.mode).weighting;
-    return options.mix_mean({independent, settings.guides, kinds, weighting, settings.std_error, stages}, here);
+    if (has_history || !settings.layers.empty() || !can_be_mixed(independent)) {
+      MixedDenoising out = here();
+      out.result.note += out.result.note.empty() ? kMixedHere : fmt::format("; {}", kMixedHere);
+      return out;
+    }
+    MeanMixture request{independent, settings.guides,    kinds, settings_of(options.mode).weighting,
+                        {},          settings.std_error, stages};
+    if (with_oidn)
+      request.network = [&](std::array<Image, 3> noisy) {
+        return network_images(settings.guides, options.oidn, std::move(noisy));
+      };
+    return options.mix_mean(request, here);
   };
 }
 
@@ -253,7 +253,7 @@ RowsMethod rows_of_mean(const MixedDenoisingOptions& options) {
     return parts;
   };
   method.filters = [options](const Guides& guides, int first_row, double samples) {
-    const FilterKinds kinds = kinds_for(samples, options.use_oidn, {});
+    const FilterKinds kinds = kinds_for(samples, options.use_oidn);
     return filtered_candidates(guides, CandidateBase::kMean, kinds, first_row);
   };
   method.are_enough = [](const Samples& rows) { return can_be_mixed(rows.independent); };

@@ -4,12 +4,17 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
+#include <vector>
 
+#include "denoising/candidates.h"
 #include "denoising/denoising_parts.h"
 #include "denoising/limited_groups.h"
 #include "estimators/test_images.h"
+#include "filters/residual_correction.h"
 #include "gpu/comparison.h"
+#include "gpu/network_candidates.h"
 
 namespace covary::gpu {
 namespace {
@@ -67,6 +72,27 @@ TEST(GpuParts, NoticesAMissingLimit) {
     EXPECT_EQ(agree(expected.whole.limited->estimate.data,
                     device.download(moments(device, uploaded, {}, &limits, planted).mean)),
               !planted);
+}
+
+TEST(GpuNetworkCandidates, HaveTheResidualsOfTheProcessor) {
+  device::Device& device = test_device();
+  const test::Grouped image = image_of_groups(12, true);
+  const DenoisingParts parts = covary::parts_of_mean(image.view());
+  const Image& clean = parts.halves[0].limited->estimate;  // stands for a network's image
+  const Groups uploaded = upload(device, image.view());
+  const std::array<PartBuffers, 3> on_device = gpu::parts_of_mean(device, uploaded);
+  const auto result = device.make<float>(kNetworkCandidates * clean.data.size());
+  for (const bool planted : {false, true}) {
+    write_network_candidates(device, uploaded, on_device[0], relative_counts_of(device, image.view(), {}), clean,
+                             result, planted);
+    for (size_t i = 0; i < kNetworkResiduals.size(); ++i) {
+      Image expected = clean;
+      add_residual(parts.whole.limited->independent, kNetworkResiduals[i], parts.valid, expected);
+      std::vector<float> found(clean.data.size());
+      device.read(result, found, (i + 1) * found.size());
+      EXPECT_EQ(static_cast<bool>(agree(expected.data, found)), !planted);
+    }
+  }
 }
 
 }  // namespace

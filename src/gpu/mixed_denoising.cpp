@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
+#include <memory>
 #include <utility>
 
 #include "denoising/mixed_rows.h"
@@ -11,6 +11,7 @@
 #include "gpu/filtered_candidates.h"
 #include "gpu/held_out.h"
 #include "gpu/mixture.h"
+#include "gpu/network_candidates.h"
 
 namespace covary::gpu {
 namespace {
@@ -33,6 +34,7 @@ class MeanDenoising {
     MixedDenoising out;
     out.names = names_of(makers_);
     out.result = finish(rows_of(input, mixed), makers_, "mean");
+    out.result.network_runs = network_runs_;
     if (!request_.stages) return out;
     out.weights = downloaded_images(mixed.weights, 1);
     out.candidates = downloaded_images(candidates_[0], 3);
@@ -42,14 +44,30 @@ class MeanDenoising {
  private:
   size_t pixels() const { return static_cast<size_t>(groups_.pixels()); }
 
+  /// Tells the names: those of the network first.
   void make_candidates() {
-    makers_.resize(1);  // tells the names
-    makers_[0].names = filter_names(request_.guides, CandidateBase::kMean, request_.kinds);
+    NetworkImages network;
+    if (request_.network) {
+      network = request_.network(
+          {downloaded(parts_[0].noisy(), 3), downloaded(parts_[1].noisy(), 3), downloaded(parts_[2].noisy(), 3)});
+      makers_.push_back(
+          neural_candidates({}, {}, CandidateBase::kMean, std::make_shared<const NetworkImages>(network)));
+    }
+    makers_.emplace_back().names = filter_names(request_.guides, CandidateBase::kMean, request_.kinds);
     n_candidates_ = static_cast<int>(names_of(makers_).size());
     for (size_t i = 0; i < parts_.size(); ++i) {
       candidates_[i] = device_.make<float>(3 * pixels() * n_candidates_);
-      filter(device_, groups_, guides_, parts_[i], i > 0, {&candidates_[i], 0});
+      const size_t filtered = request_.network ? 3 * pixels() * kNetworkCandidates : 0;
+      filter(device_, groups_, guides_, parts_[i], i > 0, {&candidates_[i], filtered});
+      if (!request_.network) continue;
+      const GroupSet set = i == 0 ? GroupSet{} : GroupSet{static_cast<int>(i) - 1, 2};
+      write_network_candidates(device_, groups_, parts_[i], relative_counts_of(device_, request_.independent, set),
+                               network.images[i], candidates_[i]);
+      if (parts_[i].limited)
+        limit_by_network(device_, groups_.width, groups_.height, n_candidates_, parts_[i].limited,
+                         parts_[i].limited_error, candidates_[i]);
     }
+    network_runs_ = network.runs;
   }
 
   MixtureBuffers mixture_input() {
@@ -111,7 +129,7 @@ class MeanDenoising {
   GuideBuffers guides_;
   std::array<PartBuffers, 3> parts_;
   std::vector<CandidateMaker> makers_;
-  int n_candidates_ = 0;
+  int n_candidates_ = 0, network_runs_ = 0;
   std::array<Buffer<float>, 3> candidates_;
   std::array<Buffer<float>, 2> counts_;
 };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The default's denoising, denoising/mixed_denoising.h, on a device: the samples and auxiliary images go there once,
 // and the picture with its error comes back. Every step is tested against the processor's function.
+//
+// A network is MeanMixture::network: its three noisy images come down, and what it makes of them goes up.
 #pragma once
 
 #include "denoising/mean_mixture.h"

@@ -4,9 +4,15 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+#include <memory>
+#include <span>
+#include <string>
+
 #include "combine/registry.h"
 #include "estimators/test_images.h"
 #include "gpu/comparison.h"
+#include "gpu/target.h"
 #include "risk/error_interval.h"
 #include "risk/plain_mean.h"
 
@@ -87,6 +93,59 @@ TEST(GpuMixedDenoising, TakesTwoGroups) {
   test::Grouped image = test::noisy_image(kWidth, kHeight, 2, 23, 1);
   image.counts.assign(size_t{kWidth} * kHeight, 8);
   expect_same(image, {&p.albedo}, DenoiseMode::kAuto);
+}
+
+/// Stands for a network: the mean of 3 x 3 pixels.
+Image blurred(const Image& image) {
+  Image result = image;
+  for (int y = 1; y + 1 < image.height; ++y)
+    for (int x = 1; x + 1 < image.width; ++x)
+      for (int c = 0; c < 3; ++c) {
+        float sum = 0;
+        for (int i = 0; i < 9; ++i) sum += image.pixel(x + i % 3 - 1, y + i / 3 - 1)[c];
+        result.pixel(x, y)[c] = sum / 9;
+      }
+  return result;
+}
+
+TEST(GpuMixedDenoising, TakesTheImagesOfANetwork) {
+  const Pictures p;
+  test::Grouped image = test::noisy_image(kWidth, kHeight, 6, 27, 1);
+  for (int i = 0; i < kWidth * kHeight; ++i) image.counts.push_back(12 + static_cast<uint32_t>(i % 5));
+  image.pixel(30, 30)[0] = 2000;  // a firefly
+  const Guides guides{&p.albedo, &p.normal};
+  DenoisingParts parts = covary::parts_of_mean(image.view());
+  const auto network = [](const std::array<Image, 3>& noisy) {
+    return NetworkImages{{blurred(noisy[0]), blurred(noisy[1]), blurred(noisy[2])}, 3};
+  };
+  const auto made = std::make_shared<const NetworkImages>(
+      network({parts.whole.limited->estimate, parts.halves[0].limited->estimate, parts.halves[1].limited->estimate}));
+  const std::vector<CandidateMaker> makers = {neural_candidates({}, {}, CandidateBase::kMean, made),
+                                              filtered_candidates(guides, CandidateBase::kMean, FilterKinds::kNlMeans)};
+  parts.guides = guides;
+  const MixedDenoising expected = denoise_by_mixture(std::move(parts), makers, DenoiseMode::kAuto, true);
+  const MixedDenoising found =
+      mix_mean(test_device(), {image.view(), guides, FilterKinds::kNlMeans, {1, 1, false}, network, true, true});
+  EXPECT_EQ(found.names, expected.names);
+  EXPECT_EQ(found.result.network_runs, 3);
+  for (size_t i = 0; i < expected.candidates.size(); ++i)
+    EXPECT_TRUE(agree(expected.candidates[i].data, found.candidates[i].data)) << expected.names[i];
+  EXPECT_TRUE(agree(expected.result.estimate.data, found.result.estimate.data));
+  EXPECT_TRUE(agree(expected.result.std_error.data, found.result.std_error.data));
+}
+
+/// The command line's method uses the device, and says so; what devices cannot do is told.
+TEST(GpuMixedDenoising, IsPartOfTheDefault) {
+  const test::Grouped image = test::noisy_image(kWidth, kHeight, 6, 28, 1);
+  const auto target = std::make_shared<Target>(device::Device::open("opencl"), false);
+  const Method method = make_default_estimator(false, {}, {DenoisingChoice::kAuto, "off", {}}, target);
+  const MethodImage found = method.image({{}, image.view()}, {});
+  EXPECT_EQ(target->made_by(), target->info().text());
+  EXPECT_EQ(found.note, "");
+  const Layer layer{"Direct", image.view(), 0};
+  MethodSettings settings;
+  settings.layers = std::span(&layer, 1);
+  EXPECT_NE(method.image({{}, image.view()}, settings).note.find("on the processor"), std::string::npos);
 }
 
 TEST(GpuMixedDenoising, IsTheSameEveryTime) {

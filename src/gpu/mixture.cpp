@@ -93,10 +93,10 @@ Buffer<float> disagreement(Device& device, const MixtureBuffers& in, const Buffe
   return result;
 }
 
-void limit_by_network(Device& device, const MixtureBuffers& in, const Buffer<float>& estimate,
+void limit_by_network(Device& device, int width, int height, int n_candidates, const Buffer<float>& estimate,
                       const Buffer<float>& std_error, const Buffer<float>& candidates) {
-  device.launch(kernel(device, "limit_by_network", in.candidates), image_of(in.width, in.height), kOfImage, estimate,
-                std_error, in.width, in.height, candidates);
+  device.launch(kernel(device, "limit_by_network", n_candidates), image_of(width, height), kOfImage, estimate,
+                std_error, width, height, candidates);
 }
 
 }  // namespace covary::gpu

@@ -50,7 +50,7 @@ MixedBuffers mix(Device& device, const MixtureBuffers& in,
 Buffer<float> disagreement(Device& device, const MixtureBuffers& in, const Buffer<float>& mixture);
 
 /// Limits the brightness of all candidates of a part but the first, a network's image.
-void limit_by_network(Device& device, const MixtureBuffers& in, const Buffer<float>& estimate,
+void limit_by_network(Device& device, int width, int height, int n_candidates, const Buffer<float>& estimate,
                       const Buffer<float>& std_error, const Buffer<float>& candidates);
 
 }  // namespace covary::gpu

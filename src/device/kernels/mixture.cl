@@ -137,8 +137,8 @@ FUNCTION void solve_mixture(const float* sums, GLOBAL const float* prior, float 
   }
   gradient[M] = 0;
   for (int sweep = 0; sweep < SWEEPS; ++sweep)
-    for (int p = 0; p < M; ++p)
-      for (int q = p + 1; q <= M; ++q) {
+    UNROLL for (int p = 0; p < M; ++p)
+      UNROLL for (int q = p + 1; q <= M; ++q) {
         // Moves weight `step` from q to p; along a non-convex edge, to its better end.
         const float curvature = element(a, p, p) + element(a, q, q) - 2 * element(a, p, q);
         const float slope = gradient[q] - gradient[p];
@@ -146,7 +146,7 @@ FUNCTION void solve_mixture(const float* sums, GLOBAL const float* prior, float 
         const float step = min(max(wanted, -x[p]), x[q]);
         x[p] += step;
         x[q] -= step;
-        for (int k = 0; k < M; ++k) gradient[k] = fma(step, element(a, k, p) - element(a, k, q), gradient[k]);
+        UNROLL for (int k = 0; k < M; ++k) gradient[k] = fma(step, element(a, k, p) - element(a, k, q), gradient[k]);
       }
 }
 

@@ -31,10 +31,10 @@ FUNCTION float term_of(float difference, float v, float u) {
 }
 
 #if GUIDES > 0
-// ||q_i - q_j||^2 of an image divided by `unit`.
-FUNCTION float guide_distance(GLOBAL const float* guide, float unit, int i, int j) {
+// ||q_i - q_j||^2 of an image multiplied by `scale`.
+FUNCTION float guide_distance(GLOBAL const float* guide, float scale, int i, int j) {
   float sum = 0;
-  for (int c = 0; c < 3; ++c) sum += square((guide[3 * i + c] - guide[3 * j + c]) / unit);
+  for (int c = 0; c < 3; ++c) sum += square((guide[3 * i + c] - guide[3 * j + c]) * scale);
   return sum;
 }
 #endif
@@ -87,10 +87,10 @@ KERNEL nl_means(GLOBAL const float* image, GLOBAL const float* std_error, GLOBAL
 #endif
         float distance = 0;
 #if GUIDES > 0
-        distance = guide_distance(guide0, unit0, (y + r) * width + x, j);
+        distance = guide_distance(guide0, 1 / unit0, (y + r) * width + x, j);
 #endif
 #if GUIDES > 1
-        distance += guide_distance(guide1, unit1, (y + r) * width + x, j);
+        distance += guide_distance(guide1, 1 / unit1, (y + r) * width + x, j);
 #endif
         for (int k = 0; k < TASKS; ++k) {
           const float weight = exp_of_nonpositive(-max(max(patch * scales[k], distance), 0.0f));

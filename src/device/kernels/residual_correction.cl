@@ -14,6 +14,7 @@
 #define SECOND_WIDENING 12.0f
 #define NOISE 0.2f
 #define WIDE_NOISE 1.0f
+#define LEAST_SQUARE 1e-4f
 
 FUNCTION int cells_of(int pixels) { return (pixels + SIDE - 1) / SIDE; }
 
@@ -119,4 +120,32 @@ KERNEL correct_again(GLOBAL const float* RESTRICT guides, GLOBAL const float* RE
                                       variance * (bandwidth * SECOND_WIDENING * SECOND_WIDENING));
   const float b = share_of(&mean, (WIDE_NOISE + PLANTED_BUG) * variance);
   for (int c = 0; c < 3; ++c) estimate[3 * (size_t)p + c] = f[c] + b * value_of(&mean, c);
+}
+
+// What residual_cells reads, from the mean h of an image and the numbers of samples of its pixels relative to their
+// mean, 1 without them.
+KERNEL residual_input(GLOBAL const float* RESTRICT h, GLOBAL const float* RESTRICT relative_counts, int has_counts,
+                      int n_pixels, GLOBAL float* RESTRICT guide, GLOBAL float* RESTRICT other) {
+  const int p = get_global_id(0);
+  if (p >= n_pixels) return;
+  vstore4(FLOAT4(0.0f, 0.0f, 0.0f, has_counts ? relative_counts[p] : 1.0f), p, guide);
+  vstore4(FLOAT4(h[3 * (size_t)p], h[3 * (size_t)p + 1], h[3 * (size_t)p + 2], 0.0f), p, other);
+}
+
+// The estimate with its residual (ResidualOptions), from element `first` of `result` on, one item a pixel: means over
+// cells of SIDE x SIDE pixels with the squared bandwidth (k f')^2 + 1e-4; `bandwidth`: k.
+KERNEL add_residual(GLOBAL const float* RESTRICT guides, GLOBAL const float* RESTRICT residuals,
+                    GLOBAL const uchar* RESTRICT valid, GLOBAL const float* RESTRICT estimate, int width, int height,
+                    int radius, float bandwidth, int first, GLOBAL float* RESTRICT result) {
+  const int x = get_global_id(0), y = get_global_id(1), p = y * width + x;
+  if (x >= width || y >= height) return;
+  float f[3], brightness = 0.0f;
+  for (int c = 0; c < 3; ++c) {
+    f[c] = estimate[3 * (size_t)p + c];
+    brightness += f[c] * (bandwidth / 3);
+  }
+  const GuidedMean mean = guided_mean(guides, residuals, SIDE, radius, width, height, x, y, f,
+                                      brightness * brightness + LEAST_SQUARE);
+  for (int c = 0; c < 3; ++c)
+    result[first + 3 * (size_t)p + c] = f[c] + (valid[p] ? (1.0f - PLANTED_BUG) * value_of(&mean, c) : 0.0f);
 }
