@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "denoising/mixed_rows.h"
@@ -18,18 +19,23 @@ namespace {
 
 class MeanDenoising {
  public:
-  MeanDenoising(Device& device, const MeanMixture& request)
-      : device_(device),
-        request_(request),
-        groups_(upload(device, request.independent)),
-        guides_(device, request.guides, request.kinds),
-        parts_(parts_of_mean(device, groups_)) {}
+  MeanDenoising(Device& device, const MeanMixture& request, const Trial& trial)
+      : device_(device), request_(request), stages_(device, trial) {}
 
   MixedDenoising run() {
-    make_candidates();
-    const MixtureBuffers input = mixture_input();
-    const MixedBuffers mixed = mix(device_, input, [&](const std::vector<NormalRow>& rows) {
-      return weights_of_whole(true, makers_, request_.weighting, mean_samples(request_.independent), rows);
+    stages_.run("copy samples and auxiliary images", [&] {
+      groups_ = upload(device_, request_.independent);
+      guides_.emplace(device_, request_.guides, request_.kinds);
+    });
+    stages_.run("means and errors", [&] { parts_ = parts_of_mean(device_, groups_); });
+    stages_.run(request_.network ? "candidates, with the network" : "candidates", [&] { make_candidates(); });
+    MixtureBuffers input;
+    MixedBuffers mixed;
+    stages_.run("mixture", [&] {
+      input = mixture_input();
+      mixed = mix(device_, input, [&](const std::vector<NormalRow>& rows) {
+        return weights_of_whole(true, makers_, request_.weighting, mean_samples(request_.independent), rows);
+      });
     });
     MixedDenoising out;
     out.names = names_of(makers_);
@@ -58,7 +64,7 @@ class MeanDenoising {
     for (size_t i = 0; i < parts_.size(); ++i) {
       candidates_[i] = device_.make<float>(3 * pixels() * n_candidates_);
       const size_t filtered = request_.network ? 3 * pixels() * kNetworkCandidates : 0;
-      filter(device_, groups_, guides_, parts_[i], i > 0, {&candidates_[i], filtered});
+      filter(device_, groups_, *guides_, parts_[i], i > 0, {&candidates_[i], filtered});
       if (!request_.network) continue;
       const GroupSet set = i == 0 ? GroupSet{} : GroupSet{static_cast<int>(i) - 1, 2};
       write_network_candidates(device_, groups_, parts_[i], relative_counts_of(device_, request_.independent, set),
@@ -90,11 +96,17 @@ class MeanDenoising {
   /// What mixed_rows() of denoising/mixed_rows.h makes.
   MixedRows rows_of(const MixtureBuffers& input, const MixedBuffers& mixed) {
     MixedRows rows;
-    rows.result.estimate = downloaded(mixed.image, 3);
-    const std::vector<unsigned char> valid = device_.download(groups_.valid);
-    rows.result.nonfinite_pixels = std::count(valid.begin(), valid.end(), 0);
+    stages_.run("copy picture", [&] {
+      rows.result.estimate = downloaded(mixed.image, 3);
+      const std::vector<unsigned char> valid = device_.download(groups_.valid);
+      rows.result.nonfinite_pixels = std::count(valid.begin(), valid.end(), 0);
+    });
     rows.result.risk_kind = has_network(makers_) ? ErrorKind::kNetwork : ErrorKind::kFilters;
-    if (!request_.std_error) return rows;
+    if (request_.std_error) stages_.run("errors, with their copies", [&] { find_errors(input, mixed, rows); });
+    return rows;
+  }
+
+  void find_errors(const MixtureBuffers& input, const MixedBuffers& mixed, MixedRows& rows) {
     HeldOutBuffers held_out{groups_.width,   groups_.height, {Place{&mixed.halves[0]}, Place{&mixed.halves[1]}}, {},
                             &candidates_[0], &groups_.valid};
     for (const int half : {0, 1}) held_out.independent[half] = &parts_[half + 1].independent;
@@ -102,14 +114,13 @@ class MeanDenoising {
     rows.disagreement = downloaded(disagreement(device_, input, mixed.image), 1);
     rows.result.bias = held_out_bias(device_, held_out, {&candidates_[1], &candidates_[2]});
     rows.result.risk_rows =
-        image_risk(device_, held_out, mixed.image, parts_[0].independent, groups_, guides_.surfaces());
+        image_risk(device_, held_out, mixed.image, parts_[0].independent, groups_, guides_->surfaces());
     for (const auto& [error, n] : base_rows(device_, held_out, parts_[0].std_error)) rows.of_base.push_back({error, n});
     for (int p = 0; p < n_candidates_; ++p) {
       const size_t first = 3 * pixels() * p;
       held_out.halves = {Place{&candidates_[1], first}, Place{&candidates_[2], first}};
       rows.of_candidates.push_back(held_out_rows(device_, held_out));
     }
-    return rows;
   }
 
   Image downloaded(const Buffer<float>& buffer, int channels, size_t first = 0) {
@@ -125,8 +136,9 @@ class MeanDenoising {
 
   Device& device_;
   const MeanMixture& request_;
+  Stages stages_;
   Groups groups_;
-  GuideBuffers guides_;
+  std::optional<GuideBuffers> guides_;
   std::array<PartBuffers, 3> parts_;
   std::vector<CandidateMaker> makers_;
   int n_candidates_ = 0, network_runs_ = 0;
@@ -136,6 +148,8 @@ class MeanDenoising {
 
 }  // namespace
 
-MixedDenoising mix_mean(Device& device, const MeanMixture& request) { return MeanDenoising(device, request).run(); }
+MixedDenoising mix_mean(Device& device, const MeanMixture& request, const Trial& trial) {
+  return MeanDenoising(device, request, trial).run();
+}
 
 }  // namespace covary::gpu

@@ -8,11 +8,12 @@
 #include "denoising/mean_mixture.h"
 #include "denoising/mixed_denoising.h"
 #include "device/device.h"
+#include "gpu/trial.h"
 
 namespace covary::gpu {
 
 /// Implements MixedDenoisingOptions::mix_mean. Values agree with the processor's to rounding: 99.9 % of them within
 /// 1e-4 of value + 0.01. Bit-identical on one device. Throws device::Failure, and like the network.
-MixedDenoising mix_mean(device::Device& device, const MeanMixture& request);
+MixedDenoising mix_mean(device::Device& device, const MeanMixture& request, const Trial& trial = {});
 
 }  // namespace covary::gpu

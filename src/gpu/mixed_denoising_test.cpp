@@ -8,6 +8,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "combine/registry.h"
 #include "estimators/test_images.h"
@@ -146,6 +147,18 @@ TEST(GpuMixedDenoising, IsPartOfTheDefault) {
   MethodSettings settings;
   settings.layers = std::span(&layer, 1);
   EXPECT_NE(method.image({{}, image.view()}, settings).note.find("on the processor"), std::string::npos);
+}
+
+TEST(GpuMixedDenoising, TimesItsStages) {
+  const test::Grouped image = test::noisy_image(kWidth, kHeight, 6, 29, 1);
+  std::vector<std::string> stages;
+  const Trial trial{"", 0, [&](const std::string& stage, double seconds) {
+                      stages.push_back(stage);
+                      EXPECT_GE(seconds, 0);
+                    }};
+  mix_mean(test_device(), {image.view(), {}, FilterKinds::kNlMeans, {1, 0, false}, {}, true, false}, trial);
+  EXPECT_EQ(stages, (std::vector<std::string>{"copy samples and auxiliary images", "means and errors", "candidates",
+                                              "mixture", "copy picture", "errors, with their copies"}));
 }
 
 TEST(GpuMixedDenoising, IsTheSameEveryTime) {
