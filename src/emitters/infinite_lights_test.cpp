@@ -177,6 +177,45 @@ TEST(EnvironmentMap, SamplesWhatItClaimsInWorldSpace) {
   expect_rays_cover_the_scene(*light);
 }
 
+/// Two maps and a constant: radiances add up, and each direction has the density of all that may choose it.
+TEST(Environments, SampleTheSumOfTheirParts) {
+  const TemporaryFolder folder;
+  const std::shared_ptr<const Emitter> map = sun(folder), even = make("constant", {}).object;
+  const auto sum_of = [&](const std::vector<std::shared_ptr<const Emitter>>& parts) {
+    Diagnostics diagnostics;
+    GivenObjects objects(diagnostics);
+    NamedValues values;
+    for (const auto& part : parts) values.emplace_back("", objects.nest("emitter", part));
+    return make_plugin<Emitter>(emitter_plugins(), "emitter", "environments", values, objects, diagnostics);
+  };
+  const auto light = sum_of({map, even, map}).object->in_scene(kBounds);
+  const auto placed = map->in_scene(kBounds), constant = even->in_scene(kBounds);
+  EXPECT_TRUE(light->is_environment());
+  for (const Vec3& d : {Vec3{0, 1, 0}, normalize(Vec3{1, 2, -3}), Vec3{-1, 0, 0}})
+    for (int c = 0; c < 3; ++c)
+      EXPECT_NEAR(light->environment(d).radiance[c], 2 * map->environment(d).radiance[c] + 1, 1e-4f);
+  const double power = luminance(light->power());
+  EXPECT_NEAR(power, luminance(2.0f * placed->power() + constant->power()), 1e-5 * power);
+  EXPECT_TRUE(mean_test([&](const PathRandom& r) { return power_estimate(*light, false, r); }, power).accepted);
+  const auto result = statistics::chi2_sphere(
+      [&](const PathRandom& random) -> std::optional<Vec3> { return draw_towards(*light, {}, random).wi; },
+      [&](const Vec3& d) { return light->environment(d).pdf_solid_angle; }, {.name = "environments"});
+  EXPECT_TRUE(result.accepted) << result.message;
+  const auto emitted = statistics::chi2_sphere(
+      [&](const PathRandom& random) -> std::optional<Vec3> { return draw_emission(*light, random).ray.d; },
+      [&](const Vec3& d) { return light->pdf_emission({}, d).direction; }, {.name = "environments, emission"});
+  EXPECT_TRUE(emitted.accepted) << emitted.message;
+  const auto wrong = statistics::chi2_sphere(  // planted: one part alone
+      [&](const PathRandom& random) -> std::optional<Vec3> { return draw_towards(*light, {}, random).wi; },
+      [&](const Vec3& d) { return map->environment(d).pdf_solid_angle; }, {.name = "planted", .n_samples = 50000});
+  EXPECT_FALSE(wrong.accepted);
+  expect_rays_cover_the_scene(*light);
+  EXPECT_NE(light->mis_compensated(), nullptr);
+  EXPECT_EQ(sum_of({even, even}).object->mis_compensated(), nullptr);
+  EXPECT_EQ(sum_of({}).errors, "test.xml:1:1: emitter 'environments': holds no emitters");
+  EXPECT_NE(sum_of({make("point", {}).object}).errors.find("does not shine from all around"), std::string::npos);
+}
+
 TEST(EnvironmentMap, ReportsWrongParameters) {
   const TemporaryFolder folder;
   std::ofstream(folder.file("a.hdr")) << "nothing";

@@ -14,7 +14,9 @@
 // |--------------------|-----------|------------|------------------------------------------------|
 // | v00, v01, v10, v11 | colour    | 0, 1, 0, 1 | at (0, 0), (0, 1), (1, 0), (1, 1)              |
 // | to_uv              | transform | identity   | from surface parameters to texture coordinates |
+// | repeat             | boolean   | false      | begin again at each integer coordinate         |
 #include <algorithm>
+#include <cmath>
 
 #include "textures/gradient.h"
 #include "textures/registry.h"
@@ -61,27 +63,35 @@ class Mix final : public Texture {
 
 class Bilerp final : public Texture {
  public:
-  explicit Bilerp(Parameters& p) : to_uv_(p.get_transform("to_uv")) {
+  explicit Bilerp(Parameters& p) : to_uv_(p.get_transform("to_uv")), repeat_(p.get_bool("repeat", false)) {
     constexpr const char* kNames[] = {"v00", "v10", "v01", "v11"};
     for (size_t i = 0; i < 4; ++i)
       corners_[i] = p.get_spectrum(kNames[i], Spectrum(i < 2 ? 0.0f : 1.0f), SpectrumRole::kEmission);
   }
-  Spectrum eval(const SurfaceHit& hit) const override { return at(to_uv_.apply(hit.uv)); }
+  Spectrum eval(const SurfaceHit& hit) const override {
+    const Spectrum value = at(place(hit));
+    return {std::max(value.r, 0.0f), std::max(value.g, 0.0f), std::max(value.b, 0.0f)};
+  }
   float eval_1(const SurfaceHit& hit) const override { return luminance(eval(hit)); }
   Vec2 grad_1(const SurfaceHit& hit) const override {
-    const Vec2 st = to_uv_.apply(hit.uv);
+    const Vec2 st = place(hit);
     const auto step = [&](float s, float t) { return luminance(at({st.x + s, st.y + t})) - luminance(at(st)); };
     return to_uv_.chain({step(1, 0), step(0, 1)});  // exact: linear in each
   }
   float mean() const override { return covary::mean(at({0.5f, 0.5f})); }
 
  private:
+  Vec2 place(const SurfaceHit& hit) const {
+    const Vec2 st = to_uv_.apply(hit.uv);
+    return repeat_ ? Vec2{st.x - std::floor(st.x), st.y - std::floor(st.y)} : st;
+  }
   Spectrum at(Vec2 st) const {
     return lerp(st.y, lerp(st.x, corners_[0], corners_[1]), lerp(st.x, corners_[2], corners_[3]));
   }
 
   Spectrum corners_[4];
   UvTransform to_uv_;
+  bool repeat_;
 };
 
 }  // namespace

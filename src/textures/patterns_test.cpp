@@ -57,6 +57,18 @@ TEST(Patterns, MixInterpolates) {
   EXPECT_FALSE(direction.object->is_constant());
 }
 
+/// uv.h of pbrt-v3: (s - floor(s), t - floor(t)). Beyond its square, a plain one goes on, not below 0.
+TEST(Patterns, BilerpMayRepeat) {
+  const auto repeated = make("bilerp", {{"v00", ColourValue{{0, 0, 0}}},
+                                        {"v10", ColourValue{{1, 0, 0}}},
+                                        {"v01", ColourValue{{0, 1, 0}}},
+                                        {"v11", ColourValue{{1, 1, 0}}},
+                                        {"repeat", true}});
+  expect_near(repeated.object->eval(at({}, {-0.25f, 3.5f})), {0.75f, 0.5f, 0});
+  expect_near(repeated.object->eval(at({}, {0.25f, 0.5f})), {0.25f, 0.5f, 0});
+  expect_near(coordinates()->eval(at({}, {-0.25f, 3.5f})), {0, 3.5f, 0});
+}
+
 TEST(Patterns, FactorsMayBeTextures) {
   Diagnostics diagnostics;
   GivenObjects objects(diagnostics);
