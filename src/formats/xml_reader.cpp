@@ -82,7 +82,8 @@ class Reader {
  private:
   struct Document {
     XmlDocument xml;
-    bool old;  // version 0.x or 1.x
+    bool old;       // version 0.x or 1.x
+    bool replaces;  // a parameter that is given again replaces the first one, with a warning: before version 3
   };
   /// Thrown when a limit is exceeded: reading stops at once, since going on would take the time and memory that it
   /// guards.
@@ -100,7 +101,7 @@ class Reader {
     if (n_text_bytes_ > kMaxTextBytes)
       stop({name}, fmt::format("the scene and what it includes have more than {} bytes of text", kMaxTextBytes));
     digest_ += hash_text(hash_bytes(text)) + "\n";
-    Document document{{text, name, diagnostics_}, false};
+    Document document{{text, name, diagnostics_}, false, false};
     const pugi::xml_node root = document.xml.root();
     if (!root) return;
     const SourceLocation where = document.xml.where(root);
@@ -112,7 +113,8 @@ class Reader {
       diagnostics_.error(where, fmt::format("the root element of an included file cannot be <{}>", root.name()));
       return;
     }
-    document.old = read_version(root, where) < 2;
+    const int version = read_version(root, where);
+    document.old = version < 2, document.replaces = version < 3;
     if (depth > 0 && std::string_view(root.name()) == "scene") {
       check_root_attributes(root, where);
       read_children(document, root, parent, depth, 0);  // as if the content replaced <include>
@@ -239,7 +241,7 @@ class Reader {
     adopt_forms_of_forks(*object, document.old, diagnostics_);
     if (object->kind == "bsdf" && object->type == "mixturebsdf") expand_mixture(*object, objects_, diagnostics_);
     // A missing type was reported; users of the object must not report it again.
-    add(parent, {attributes.get("name"), attributes.complete() ? ObjectPtr(object) : ObjectPtr(), where});
+    add(document, parent, {attributes.get("name"), attributes.complete() ? ObjectPtr(object) : ObjectPtr(), where});
   }
 
   /// Reads anything that is not an object.
@@ -276,9 +278,9 @@ class Reader {
       if (!attributes.complete()) return;
       auto reference = std::make_shared<ObjectDescription>();  // placeholder until everything is read
       reference->kind = "ref", reference->id = attributes.get("id"), reference->where = where;
-      add(owner, {attributes.get("name"), ObjectPtr(reference), where});
+      add(document, owner, {attributes.get("name"), ObjectPtr(reference), where});
     } else {
-      add(owner, PropertyReader(defines_, files_, diagnostics_, document.old).read(document.xml, node));
+      add(document, owner, PropertyReader(defines_, files_, diagnostics_, document.old).read(document.xml, node));
     }
   }
 
@@ -299,17 +301,16 @@ class Reader {
     }
   }
 
-  /// Appends a property; false if its name is already used.
-  bool add(ObjectDescription& owner, Property property) {
-    if (!property.name.empty())
-      for (const Property& other : owner.properties)
-        if (other.name == property.name) {
-          diagnostics_.error(property.where, fmt::format("parameter '{}' of {} '{}' is given twice; first at {}",
-                                                         property.name, owner.kind, owner.type, other.where.text()));
-          return false;
-        }
-    owner.properties.push_back(std::move(property));
-    return true;
+  /// Appends a property whose name must not be in use.
+  void add(const Document& document, ObjectDescription& owner, Property property) {
+    const auto same = [&](const Property& other) { return other.name == property.name; };
+    const auto first = property.name.empty() ? owner.properties.end() : std::ranges::find_if(owner.properties, same);
+    if (first == owner.properties.end()) return owner.properties.push_back(std::move(property));
+    const std::string message = fmt::format("parameter '{}' of {} '{}' is given twice; first at {}", property.name,
+                                            owner.kind, owner.type, first->where.text());
+    if (!document.replaces) return diagnostics_.error(property.where, message);
+    diagnostics_.warn(property.where, message + "; the last one counts, as in Mitsuba before version 3");
+    *first = std::move(property);
   }
 
   /// Replaces <spectrum type="…"> objects by plain values wherever they are used. `objects`: each after what it holds.

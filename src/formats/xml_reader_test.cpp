@@ -257,6 +257,23 @@ TEST(XmlReader, ReportsNamesGivenTwice) {
             "scene.xml:5:1: attribute 'type' of <bsdf> is given twice");
 }
 
+/// As in Mitsuba before version 3: a warning, and the last value.
+TEST(XmlReader, OldFilesMayGiveAParameterTwice) {
+  for (const char* version : {"0.5.0", "2.0.0"}) {
+    const Read r = read("<scene version=\"" + std::string(version) +
+                        "\"><film type=\"hdrfilm\"><integer name=\"height\" value=\"5\"/>\n"
+                        "<integer name=\"height\" value=\"6\"/></film></scene>");
+    EXPECT_EQ(r.errors, "no error");
+    ASSERT_EQ(r.warnings.size(), 1u);
+    EXPECT_TRUE(contains(r.warnings[0],
+                         "scene.xml:2:1: parameter 'height' of film 'hdrfilm' is given twice; first at "
+                         "scene.xml:1:45; the last one counts, as in Mitsuba before version 3"))
+        << r.warnings[0];
+    EXPECT_EQ(child(r).properties.size(), 1u);
+    EXPECT_EQ(value<int64_t>(r, "height"), 6);
+  }
+}
+
 TEST(XmlReader, BoundsNesting) {
   std::string deep;
   for (int i = 0; i < 1000; ++i) deep += "<bsdf type=\"twosided\">";

@@ -13,6 +13,7 @@
 #include "formats/file_resolver.h"
 #include "formats/object_builder.h"
 #include "imageio/png.h"
+#include "io/media.h"
 #include "io/scene_file.h"
 #include "scene/embedded_data.h"
 #include "textures/image.h"
@@ -61,10 +62,12 @@ void warn_of_own_plugins(const ObjectDescription& scene, std::vector<std::string
     if (!child || !*child) return;
     const ObjectDescription& object = **child;
     static const std::set<std::pair<std::string, std::string>> kOwn = {
-        {"texture", "bilerp"},         {"texture", "dots"},        {"texture", "mix"},     {"texture", "noise"},
-        {"texture", "scale"},          {"texture", "projected"},   {"integrator", "bdpt"}, {"bsdf", "difftrans"},
-        {"bsdf", "metallicroughness"}, {"emitter", "goniometric"}, {"bsdf", "coating"},    {"bsdf", "phong"},
-        {"bsdf", "roughcoating"},      {"bsdf", "ward"},           {"sensor", "spherical"}};
+        {"texture", "bilerp"},      {"texture", "dots"},   {"texture", "mix"},
+        {"texture", "noise"},       {"texture", "scale"},  {"texture", "projected"},
+        {"integrator", "bdpt"},     {"bsdf", "difftrans"}, {"bsdf", "metallicroughness"},
+        {"emitter", "goniometric"}, {"bsdf", "coating"},   {"bsdf", "phong"},
+        {"bsdf", "roughcoating"},   {"bsdf", "ward"},      {"sensor", "spherical"},
+        {"emitter", "environments"}};
     const bool own = kOwn.contains({object.kind, object.type});
     if (const std::string name = own_parameter(object); !name.empty() && told.insert(name).second)
       warnings.push_back(fmt::format("{}: the {} '{}' gets the parameter '{}', which Mitsuba 3 does not have",
@@ -73,15 +76,6 @@ void warn_of_own_plugins(const ObjectDescription& scene, std::vector<std::string
       warnings.push_back(fmt::format("{}: becomes the {} '{}', which Mitsuba 3 does not have", object.where.text(),
                                      object.kind, object.type));
   });
-}
-
-bool has_media(const ObjectDescription& scene) {
-  bool found = false;
-  visit_properties(scene, [&](const ObjectDescription&, const Property& property) {
-    const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
-    found |= child && *child && (*child)->kind == "medium";
-  });
-  return found;
 }
 
 using FindFile = std::function<std::string(const std::string& name, const SourceLocation& where)>;

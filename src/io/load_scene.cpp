@@ -13,6 +13,7 @@
 #include "core/memory_limit.h"
 #include "core/stopwatch.h"
 #include "formats/file_resolver.h"
+#include "io/default_sensor.h"
 #include "io/media.h"
 #include "io/nested_integrator.h"
 #include "io/object_factory.h"
@@ -72,7 +73,7 @@ class Loader {
     complete_view();
     jobs_.append_diagnostics_of_shapes(diagnostics_);
     degenerate_.tell(diagnostics_);
-    if (!sensor_ && !(diagnostics_.has_errors() && (is_gltf_ || !options_.view.camera.empty())))
+    if (!sensor_ && !diagnostics_.has_errors())
       diagnostics_.error(xml_.scene->where, is_gltf_ ? "no triangles, and no camera" : "the scene has no sensor");
     if (sensor_made_) set_up_camera(*sensor_made_);
   }
@@ -83,15 +84,16 @@ class Loader {
     const SourceLocation where{xml_.scene->where.file, 0, 0};
     Orientation orientation = orientation_of(is_gltf_ || !sensor_made_ ? nullptr : &sensor_made_->camera);
     const Bounds3 bounds = bounds_of(parts_);
-    if (!sensor_ && !bounds.empty() && (view.camera == "auto" || (is_gltf_ && view.camera.empty()))) {
+    if (!sensor_ && !bounds.empty() && (view.camera == "auto" || view.camera.empty())) {
       const ObjectPtr like = first_sensor(*xml_.scene);
       const auto made = like ? std::dynamic_pointer_cast<const SensorSettings>(factory_.make(like)) : nullptr;
       if (!is_gltf_ && made) orientation = orientation_of(&made->camera);
       const float aspect = aspect_of(made.get(), options_.width, options_.height);
-      sensor_ = framed_sensor(bounds, orientation, like.get(), aspect, where);
+      sensor_ = !is_gltf_ && view.camera.empty() ? default_sensor(*xml_.scene, bounds, diagnostics_)
+                                                 : framed_sensor(bounds, orientation, like.get(), aspect, where);
       sensor_made_ = std::dynamic_pointer_cast<const SensorSettings>(factory_.make(sensor_));
       result_.added.push_back(sensor_);
-      if (view.camera.empty()) diagnostics_.warn(where, "the file has no camera: everything is framed, from the front");
+      if (is_gltf_ && view.camera.empty()) diagnostics_.warn(where, kFramed);
     }
     result_.sensor = sensor_;
     if (!sensor_made_) return;
@@ -316,7 +318,7 @@ class Loader {
     }
     integrator_ = object;
     ObjectDescription changed = *object;
-    name_path(changed);
+    name_path(changed, *xml_.scene, diagnostics_);
     result_.integrator_type = changed.type;
     if (!options_.make_integrator) return;
     for (const Property& property : options_.integrator_properties) {

@@ -137,7 +137,7 @@ TEST_F(LoadScene, ReportsWrongSensors) {
       "'lanczos', 'mitchell', 'tent'\n"
       "scene.xml:6:23: unknown sampler 'sobl'; did you mean 'sobol'? Supported: 'halton', 'hammersley', 'independent', "
       "'ldsampler', 'multijitter', 'orthogonal', 'sobol', 'stratified'");
-  EXPECT_EQ(errors("<shape type=\"cube\"/>"), "scene.xml:1:1: the scene has no sensor");
+  EXPECT_EQ(errors("<bsdf type=\"diffuse\" id=\"a\"/>"), "scene.xml:1:1: the scene has no sensor");
   EXPECT_TRUE(contains(
       errors(R"(<sensor type="perspective"><transform name="to_world"><scale value="2"/></transform></sensor>)"),
       "scene.xml:2:1: sensor 'perspective': the to_world transformation of a sensor must not scale"));

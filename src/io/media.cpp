@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/media.h"
 
+#include "formats/object_builder.h"
+
 namespace covary {
 namespace {
 
@@ -14,11 +16,26 @@ std::string place_of_medium(const ObjectDescription& object) {
 
 }  // namespace
 
-void name_path(ObjectDescription& integrator) {
+void name_path(ObjectDescription& integrator, const ObjectDescription& scene, Diagnostics& diagnostics) {
+  if (integrator.type == "bdpt" && has_media(scene)) {
+    diagnostics.warn(integrator.where,
+                     "integrator 'bdpt' sees no media here and is read as 'path', whose expected picture is the same");
+    std::erase_if(integrator.properties, [](const Property& p) { return p.name == "light_tracing"; });
+    integrator.type = "path";
+  }
   if (integrator.type != "volpath" && integrator.type != "volpathmis") return;
   if (integrator.type == "volpathmis")  // selects among estimators of the same expectation
     std::erase_if(integrator.properties, [](const Property& p) { return p.name == "use_spectral_mis"; });
   integrator.type = "path";
+}
+
+bool has_media(const ObjectDescription& scene) {
+  bool found = false;
+  visit_properties(scene, [&](const ObjectDescription& object, const Property& property) {
+    const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
+    found |= (object.kind == "shape" || object.kind == "sensor") && child && *child && (*child)->kind == "medium";
+  });
+  return found;
 }
 
 bool is_part_of_media(const std::string& kind) { return kind == "medium" || kind == "phase" || kind == "volume"; }

@@ -13,8 +13,11 @@ struct ShapeMedia {
   MediumPtr interior, exterior;
 };
 
-/// Mitsuba's volumetric path tracers, `volpath` and `volpathmis`, become `path` here.
-void name_path(ObjectDescription& integrator);
+/// Mitsuba's volumetric path tracers, `volpath` and `volpathmis`, become `path` here; `bdpt` of a scene with media too,
+/// with a warning, since ours sees none.
+void name_path(ObjectDescription& integrator, const ObjectDescription& scene, Diagnostics& diagnostics);
+/// Whether a shape or the sensor is in a medium.
+bool has_media(const ObjectDescription& scene);
 /// Whether a <kind> may stand at top level to be referenced.
 bool is_part_of_media(const std::string& kind);
 /// The media that a shape references. Shapes in a group must have none.

@@ -44,6 +44,24 @@ TEST_F(SceneViews, ChoosesAmongTheSensors) {
   EXPECT_TRUE(contains(message_of([&] { load(kCube, {.camera = "a"}); }), "the scene has none: use auto"));
 }
 
+/// Mitsuba's scene.cpp: 45 degrees across the largest side, at the lowest z.
+TEST_F(SceneViews, ScenesWithoutSensorAreSeenAsInMitsuba) {
+  const LoadedScene scene = load(R"(<shape type="cube"><transform name="to_world"><scale x="2" y="4" z="1"/>
+<translate x="5" y="6" z="7"/></transform></shape>)",
+                                 {});
+  EXPECT_EQ(scene.width, 768);
+  EXPECT_TRUE(contains(scene.warnings.at(0), "the scene has no sensor: it is seen along the z axis, as in Mitsuba"));
+  const Ray middle = scene.scene->camera().ray({384, 288}, {}), left = scene.scene->camera().ray({0, 288}, {});
+  const float distance = 4 / std::tan(22.5f * kPi / 180);
+  const Vec3 from{5, 6, 6 - distance};
+  EXPECT_LT(length(middle.at(-(middle.o.z - from.z) / middle.d.z) - from), 1e-4f);
+  EXPECT_NEAR(middle.d.z, 1, 1e-5f);
+  EXPECT_NEAR(std::abs(left.d.x), std::sin(22.5f * kPi / 180), 1e-5f);
+  EXPECT_TRUE(
+      contains(message_of([&] { load("<shape type=\"disk\">\n<sensor type=\"irradiancemeter\"/></shape>", {}); }),
+               "3:1: sensor 'irradiancemeter' measures the light on its shape: a number, not a picture"));
+}
+
 /// All corners of the box are in the image, and one is within a sixth of its edge.
 TEST_F(SceneViews, FramesTheBox) {
   for (const char* scale : {"1, 1, 1", "8, 1, 1", "1, 9, 1", "1, 1, 20", "0.001, 0.002, 0.001", "5, 0, 5"})
