@@ -168,13 +168,13 @@ ObjectPtr make_pbrt_light(const std::string& type, PbrtParameters& p, const Tran
   if (type == "infinite" || type == "exinfinite") return infinite(p, to_world, exposure, names);
   if (type == "goniometric") return goniometric(p, to_world, exposure, names);
   if (type == "projection") return projection(p, to_world, exposure, names);
-  p.error("is not supported; supported: lights 'distant', 'goniometric', 'infinite', 'point', 'projection' and 'spot'");
+  p.unknown("lights 'distant', 'goniometric', 'infinite', 'point', 'projection' and 'spot'", "it is left out");
   return nullptr;
 }
 
 ObjectPtr make_pbrt_area_light(const std::string& type, PbrtParameters& p, const PbrtView& view, PbrtNames& names) {
   if (type != "diffuse" && type != "area") {
-    p.error("is not supported; supported: 'diffuse'");
+    p.unknown("'diffuse'", "it is left out");
     return nullptr;
   }
   p.ignore({"samples", "nsamples"});

@@ -168,11 +168,11 @@ ObjectBuilder base_material(const std::string& type, PbrtParameters& p, PbrtName
   if (type == "hair") return hair(p, names);
   if (type == "mix") return mix(p, names);
   if (type == "measured") return measured(p);
-  p.error(
-      "is not supported; supported: materials 'coatedconductor', 'coateddiffuse', 'conductor', 'dielectric', "
-      "'diffuse', 'diffusetransmission', 'hair', 'interface', 'measured', 'mix', 'subsurface' and 'thindielectric', "
-      "and those of version 3");
-  return nullptr;
+  const bool grey = p.unknown(
+      "materials 'coatedconductor', 'coateddiffuse', 'conductor', 'dielectric', 'diffuse', 'diffusetransmission', "
+      "'hair', 'interface', 'measured', 'mix', 'subsurface' and 'thindielectric', and those of version 3",
+      "it becomes 'diffuse', grey");
+  return grey ? two_sided(make_object("bsdf", "diffuse", p.where())) : nullptr;
 }
 
 }  // namespace

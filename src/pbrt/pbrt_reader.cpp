@@ -53,7 +53,10 @@ class Reader {
     try {
       read_file(text, name, nullptr, 0);
       if (!in_world_) messages_.error(scene->where, "the scene has no WorldBegin");
-      if (!states_.empty()) messages_.error(states_.back().where, "unterminated block");
+      if (!states_.empty() && names_.version_3)
+        messages_.warn(states_.back().where, "this block is never ended; it ends with the file, as in version 3");
+      else if (!states_.empty())
+        messages_.error(states_.back().where, "unterminated block");
       if (in_object_) messages_.error(object_where_, "this object has no ObjectEnd");
       view_.version_3 = names_.version_3;
       world_->finish(view_);

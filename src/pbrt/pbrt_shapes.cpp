@@ -55,7 +55,11 @@ std::optional<EmbeddedMesh> read_pbrt_vertices(PbrtParameters& p) {
   mesh.uvs = p.get_array("uv", "point2", 2);
   const size_t n = mesh.positions.size() / 3;
   if (n == 0) {
-    p.error("has no vertices 'P'");
+    const PbrtParameter* given = p.find("P");
+    if (given && given->numbers.empty() && given->strings.empty())
+      p.warn("has no vertices; it is left out, as in pbrt");
+    else
+      p.error("has no vertices 'P'");
     return std::nullopt;
   }
   if ((!mesh.normals.empty() && mesh.normals.size() != 3 * n) || (!mesh.uvs.empty() && mesh.uvs.size() != 2 * n)) {
@@ -126,9 +130,10 @@ PbrtShape make_pbrt_shape(const std::string& type, PbrtParameters& p, const Pbrt
   if (type == "nurbs") return make_pbrt_nurbs(p, placement);
   if (type == "curve") return make_pbrt_curve(p, placement);
   if (type == "plymesh") return ply_mesh(p, placement, files);
-  p.error(
-      "is not supported; supported: shapes 'bilinearmesh', 'curve', 'cylinder', 'disk', 'loopsubdiv', 'plymesh', "
-      "'sphere' and 'trianglemesh', and 'cone', 'heightfield', 'hyperboloid', 'nurbs' and 'paraboloid' of version 3");
+  p.unknown(
+      "shapes 'bilinearmesh', 'curve', 'cylinder', 'disk', 'loopsubdiv', 'plymesh', 'sphere' and 'trianglemesh', and "
+      "'cone', 'heightfield', 'hyperboloid', 'nurbs' and 'paraboloid' of version 3",
+      "it is left out");
   return {};
 }
 

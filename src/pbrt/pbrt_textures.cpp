@@ -213,12 +213,12 @@ ObjectBuilder bilerp(const Input& in) {
 
 /// Version 3: the fractions of the coordinates as red and green.
 ObjectBuilder coordinates(const Input& in) {
-  in.p.warn("shows texture coordinates; those outside of [0, 1] do not begin again at 0");
   auto texture = make_object("texture", "bilerp", in.p.where(),
                              {{"v00", ColourValue{{0, 0, 0}}},
                               {"v10", ColourValue{{1, 0, 0}}},
                               {"v01", ColourValue{{0, 1, 0}}},
-                              {"v11", ColourValue{{1, 1, 0}}}});
+                              {"v11", ColourValue{{1, 1, 0}}},
+                              {"repeat", true}});
   return mapped(in, texture, {});
 }
 

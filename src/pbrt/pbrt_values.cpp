@@ -162,9 +162,11 @@ Spectrum light_colour(PbrtParameters& p, const std::string& name, PbrtNames& nam
   std::optional<SampledSpectrum> spectrum;
   double scale = 1;
   const size_t n = parameter->numbers.size();
-  if (parameter->type == "blackbody" && (n == 1 || (n == 2 && names.version_3)) && parameter->numbers[0] > 0) {
+  if (parameter->type == "blackbody" && (n == 1 || n == 2) && parameter->numbers[0] > 0) {
     spectrum = pbrt_blackbody(parameter->numbers[0]);
     scale = n == 2 ? parameter->numbers[1] : 1;
+    if (n == 2 && !names.version_3)  // written by exporters, Assimp's among them
+      p.warn("has a blackbody with two numbers, which is of version 3; the second is taken as a factor");
   } else if (parameter->type == "spectrum" && parameter->strings.size() == 1) {
     if (const auto illuminant = pbrt_illuminant(parameter->strings[0]))
       return parameter->strings[0] == "stdillum-D65" ? Spectrum(1) : *illuminant;
@@ -179,7 +181,7 @@ Spectrum light_colour(PbrtParameters& p, const std::string& name, PbrtNames& nam
   const Spectrum colour = spectrum_to_rgb(*spectrum, SpectrumRole::kEmission);
   if (names.version_3) return colour * static_cast<float>(scale);
   const float y = luminance(colour);
-  if (y > 0) return colour / y;
+  if (y > 0) return colour * (static_cast<float>(scale) / y);
   p.error_at(*parameter, "is black");
   return Spectrum(1);
 }
@@ -201,6 +203,14 @@ double index_of_refraction(PbrtParameters& p, double fallback, PbrtNames& names)
   if (const auto index = pbrt_glass(glass)) {
     p.warn(fmt::format("refracts all colours alike: {} has the index {}", glass, *index));
     return *index;
+  }
+  if (eta->type == "rgb") {
+    const auto colour = rgb(p, *eta);
+    if (!colour) return fallback;
+    const double index = double{luminance(colour->rgb)};
+    if (colour->rgb != Spectrum(colour->rgb.g))
+      p.warn(fmt::format("refracts all colours alike, with the index {}, the luminance of its colour", index));
+    return index;
   }
   const auto spectrum = eta->type == "spectrum" ? spectrum_value(p, "eta", names) : std::nullopt;
   const auto* values = spectrum ? std::get_if<SampledSpectrum>(&*spectrum) : nullptr;

@@ -42,11 +42,10 @@ void read_sensor(PbrtParameters& p, ObjectDescription& film, PbrtView& view) {
 
 void read_pbrt_film(const std::string& type, PbrtParameters& p, PbrtView& view) {
   const bool version_3 = type == "image";
-  if (type != "rgb" && type != "gbuffer" && type != "spectral" && !version_3) {
-    p.error("is not supported; supported: films 'rgb', 'gbuffer' and 'spectral', and 'image' of version 3");
-    p.ignore_all();
+  if (type == "guidedgbuffer") p.warn("is read as 'gbuffer': the picture is the same");
+  if (type != "rgb" && type != "gbuffer" && type != "guidedgbuffer" && type != "spectral" && !version_3 &&
+      !p.unknown("films 'rgb', 'gbuffer' and 'spectral', and 'image' of version 3", "it is read as 'rgb'"))
     return;
-  }
   if (version_3) {
     p.rename("maxsampleluminance", "maxcomponentvalue");
     if (p.has("scale")) p.set("float", "iso", {100 * p.get_float("scale", 1)});
@@ -126,19 +125,18 @@ void read_pbrt_integrator(const std::string& type, PbrtParameters& p, PbrtView& 
   constexpr std::string_view kSame[] = {"path", "simplepath", "volpath", "simplevolpath", "bdpt",
                                         "mlt",  "sppm",       "whitted", "lightpath",     "randomwalk"};
   const bool direct = type == "directlighting";
-  if (std::ranges::find(kSame, type) == std::end(kSame) && !direct) {
+  const bool guided = type == "guidedpath" || type == "guidedvolpath";  // of the forks that guide paths
+  if (std::ranges::find(kSame, type) == std::end(kSame) && !direct && !guided) {
     const bool occlusion = type == "ambientocclusion" || type == "ao";
-    p.error(fmt::format(
-        "is not supported; supported: integrators 'bdpt', 'lightpath', 'mlt', 'path', 'randomwalk', "
-        "'simplepath', 'simplevolpath', 'sppm' and 'volpath', and 'directlighting' and 'whitted' of version "
-        "3{}",
-        occlusion            ? ", whose pictures are not that of this one"
-        : type == "function" ? "; this one tests samplers"
-                             : ""));
-    p.ignore_all();
+    p.unknown(fmt::format("integrators 'bdpt', 'lightpath', 'mlt', 'path', 'randomwalk', 'simplepath', "
+                          "'simplevolpath', 'sppm' and 'volpath', and 'directlighting' and 'whitted' of version 3{}",
+                          occlusion            ? ", whose pictures are not that of this one"
+                          : type == "function" ? "; this one tests samplers"
+                                               : ""),
+              "it becomes 'path', with media");
   } else if (type == "whitted") {
     p.warn("is read as 'path', with indirect light, which it leaves out");
-  } else if (type == "mlt" || type == "sppm" || type == "lightpath" || type == "randomwalk") {
+  } else if (guided || type == "mlt" || type == "sppm" || type == "lightpath" || type == "randomwalk") {
     p.warn("is read as 'path': the expected picture is the same");
   }
   view.integrator = make_object("integrator", type == "bdpt" ? "bdpt" : "path", p.where());
@@ -169,6 +167,7 @@ void read_pbrt_integrator(const std::string& type, PbrtParameters& p, PbrtView& 
             "numiterations",
             "imagewritefrequency",
             "pixelbounds"});
+  if (guided) p.ignore_all();  // what steers it
 }
 
 namespace {

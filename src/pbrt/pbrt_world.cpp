@@ -146,11 +146,22 @@ ObjectPtr PbrtWorld::area_light(PbrtAreaLight& light, const PbrtView& view) {
   return light.light;
 }
 
+bool PbrtWorld::is_bare_light(const ObjectPtr& material, const Pending& shape) {
+  const bool bare = names_.version_3 && shape.light && material && material->type == "null" && !shape.inside &&
+                    !shape.outside && is_opaque(shape.alpha);
+  if (bare)
+    messages_.warn(shape.shape->where, "a light without a material is opaque, as for the light rays of version 3");
+  return bare;
+}
+
 void PbrtWorld::finish_shape(const Pending& pending, const PbrtView& view) {
   bool failed = false;
   const ObjectPtr material = find(PbrtKind::kMaterial, pending.material, failed);
   ObjectDescription& shape = *pending.shape;
-  if (!failed) set_property(shape, "", surfaces_.make(material, pending.alpha, pending.uv, shape.where));
+  if (!failed && is_bare_light(material, pending))
+    set_property(shape, "", ObjectPtr(make_object("bsdf", "diffuse", shape.where, {{"reflectance", 0.0}})));
+  else if (!failed)
+    set_property(shape, "", surfaces_.make(material, pending.alpha, pending.uv, shape.where));
   const bool with_media = !view.without_media;
   for (const auto& [side, use] : {std::pair{"interior", pending.inside}, {"exterior", pending.outside}}) {
     media_left_out_ |= use && !with_media;
@@ -186,6 +197,26 @@ void PbrtWorld::finish_lights(const PbrtView& view) {
     const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value);
     return object && (*object)->kind == "emitter" && (*object)->type.empty();
   });
+  join_skies();
+}
+
+void PbrtWorld::join_skies() {
+  std::vector<Property> skies;
+  for (const Property& property : scene_->properties) {
+    const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value);
+    if (object && (*object)->kind == "emitter" && ((*object)->type == "constant" || (*object)->type == "envmap"))
+      skies.push_back(property);
+  }
+  if (skies.size() < 2) return;
+  const auto sum = make_object("emitter", "environments", skies[0].where);
+  sum->properties = skies;
+  const auto is_sky = [&](const Property& property) {
+    const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value);
+    return object &&
+           std::ranges::any_of(skies, [&](const Property& s) { return std::get<ObjectPtr>(s.value) == *object; });
+  };
+  std::erase_if(scene_->properties, is_sky);
+  set_property(*scene_, "", ObjectPtr(sum));
 }
 
 void PbrtWorld::finish(const PbrtView& view) {

@@ -81,8 +81,12 @@ class PbrtWorld {
 
   void add(const ObjectPtr& object);
   bool join_curves(const Pending& shape);
+  /// In version 3, shadow rays end at surfaces without a material: what shines from inside of a light is not seen.
+  bool is_bare_light(const ObjectPtr& material, const Pending& shape);
   void finish_shape(const Pending& shape, const PbrtView& view);
   void finish_lights(const PbrtView& view);
+  /// Several lights from all around become one that holds them.
+  void join_skies();
   ObjectPtr area_light(PbrtAreaLight& light, const PbrtView& view);
   /// Null for no use or after an error, which `failed` tells.
   ObjectPtr find(PbrtKind kind, const PbrtUsePtr& use, bool& failed);

@@ -200,6 +200,15 @@ void PbrtParameters::warn(const std::string& message) {
   messages_->warn(where_, (kind_.empty() ? what_ : kind_) + " " + message);
 }
 
+bool PbrtParameters::unknown(const std::string& supported, const std::string& instead) {
+  if (messages_->ignores_unknown())
+    warn("is unknown; " + instead);
+  else
+    error("is not supported; supported: " + supported);
+  ignore_all();
+  return messages_->ignores_unknown();
+}
+
 void PbrtParameters::ignore(std::initializer_list<const char*> names) {
   for (const char* name : names) find(name);
 }
@@ -213,7 +222,7 @@ void PbrtParameters::report_unknown(bool lenient) {
   asked_.erase(std::unique(asked_.begin(), asked_.end()), asked_.end());
   for (const PbrtParameter& parameter : parameters_) {
     if (parameter.used) continue;
-    if (lenient)
+    if (lenient || messages_->ignores_unknown())
       warn(fmt::format("has the parameter '{}', which is ignored", parameter.name));
     else
       error_at(parameter, "is not supported" + did_you_mean(parameter.name, asked_));

@@ -116,6 +116,10 @@ double PbrtTokens::number() {
                             token.kind == PbrtToken::kEnd ? "the end of the file" : "'" + token.text + "'"));
   std::string_view text = token.text;
   if (text.size() > 1 && text[0] == '+') text.remove_prefix(1);
+  if (text.size() > 1 && text.back() == ',') {  // pbrt leaves unread what follows a number
+    text.remove_suffix(1);
+    messages_.warn(where(token), "a comma behind a number is read past, as in pbrt");
+  }
   try {
     return parse_number(text);
   } catch (const Error&) {

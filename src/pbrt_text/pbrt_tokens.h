@@ -21,6 +21,7 @@ class PbrtMessages {
   explicit PbrtMessages(Diagnostics& diagnostics) : diagnostics_(&diagnostics) {}
   void error(const SourceLocation& where, const std::string& message) { diagnostics_->error(where, message); }
   void warn(const SourceLocation& where, const std::string& message);
+  bool ignores_unknown() const { return diagnostics_->ignores_unknown(); }
   /// The warnings so far, each text once, with the number of its other places.
   void flush();
   /// Takes the errors of `act` to other diagnostics, and drops its warnings.
