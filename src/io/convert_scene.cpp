@@ -159,6 +159,23 @@ class GreyImages {
   std::map<ObjectPtr, ObjectPtr> done_;
 };
 
+/// The sensor with the sampler of Mitsuba 3 that selects the same points here.
+ObjectPtr with_known_sampler(const ObjectPtr& sensor) {
+  const auto is_sobol = [](const Property& p) {
+    const ObjectPtr* child = std::get_if<ObjectPtr>(&p.value);
+    return child && *child && (*child)->kind == "sampler" && (*child)->type == "sobol";
+  };
+  if (std::none_of(sensor->properties.begin(), sensor->properties.end(), is_sobol)) return sensor;
+  auto changed = std::make_shared<ObjectDescription>(*sensor);
+  for (Property& property : changed->properties) {
+    if (!is_sobol(property)) continue;
+    auto sampler = std::make_shared<ObjectDescription>(*std::get<ObjectPtr>(property.value));
+    sampler->type = "ldsampler";
+    property.value = ObjectPtr(sampler);
+  }
+  return changed;
+}
+
 /// The scene with environments in Mitsuba's mapping and, if it has media, Mitsuba's volumetric path tracer.
 std::shared_ptr<const ObjectDescription> for_mitsuba(const ObjectDescription& scene, const FindFile& find_file,
                                                      std::vector<std::string>& warnings) {
@@ -169,6 +186,7 @@ std::shared_ptr<const ObjectDescription> for_mitsuba(const ObjectDescription& sc
     ObjectPtr* object = std::get_if<ObjectPtr>(&property.value);
     if (!object || !*object) continue;
     *object = images.of(*object);
+    if ((*object)->kind == "sensor") *object = with_known_sampler(*object);
     if (media && (*object)->kind == "integrator" && (*object)->type == "path") {
       auto integrator = std::make_shared<ObjectDescription>(**object);
       integrator->type = "volpath";

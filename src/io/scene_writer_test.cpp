@@ -123,7 +123,7 @@ const char* const kScene = R"(Scale -1 1 1
 LookAt 3 4 1.5  .5 .5 0  0 0 1
 Camera "perspective" "float fov" 45.1 "float lensradius" .1 "float focaldistance" 4.3
 Film "rgb" "integer xresolution" 60 "integer yresolution" [ 40 ] "float cropwindow" [ 0 .5 .1 1 ]
-Sampler "zsobol" "integer pixelsamples" 32
+Sampler "independent" "integer pixelsamples" 32
 PixelFilter "triangle" "float xradius" 1.1 "float yradius" 1.1
 Integrator "bdpt" "integer maxdepth" [ 4 ]
 WorldBegin
@@ -158,6 +158,15 @@ Material "diffuse" "texture reflectance" "picture"
 Shape "cylinder" "float zmin" -1.3 "float alpha" .25
 Shape "bilinearmesh" "point3 P" [ 0 0 0  1 0 0  0 1.1 0  1 1.1 0 ]
 )";
+
+/// Mitsuba 3 has no sampler `sobol`.
+TEST_F(SceneWriter, SamplersAreThoseOfMitsuba) {
+  const std::string from =
+      write("scene.pbrt", "Sampler \"zsobol\" \"integer pixelsamples\" 32\nWorldBegin\nShape \"sphere\"\n");
+  const std::string text = convert(from, "out.xml").document.xml;
+  EXPECT_NE(text.find("<sampler type=\"ldsampler\""), std::string::npos) << text;
+  EXPECT_EQ(text.find("sobol"), std::string::npos) << text;
+}
 
 TEST_F(SceneWriter, ScenesOfPbrtStayTheSameToTheLastBit) {
   write("picture.ppm", "P6\n1 1\n255\nabc");
