@@ -2,7 +2,6 @@
 #include "lab/experiment.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -11,7 +10,6 @@
 
 #include "core/content_hash.h"
 #include "core/error.h"
-#include "core/shell_text.h"
 #include "core/stop.h"
 #include "core/stopwatch.h"
 #include "core/unfinished.h"
@@ -66,6 +64,7 @@ class Experiment {
  public:
   Experiment(const Suite& suite, const ExperimentOptions& options)
       : options_(options),
+        reader_(options.reader ? options.reader : std::make_shared<SceneReader>(options.program, options.stop)),
         cache_(options.cache_folder, part_name(options.part)),
         runner_(cache_, options.program, options.threads, options.stop) {
     results_.suite = suite;
@@ -105,34 +104,16 @@ class Experiment {
     if (options_.progress) options_.progress({done_, total_, clock_.seconds_left(), what, kind});
   }
 
-  /// Frame size and hash of a scene, as reported by the program: a scene that crashes the reader must not end the
-  /// experiment.
   void look_at(size_t index) {
-    SceneInstance scene = located(results_.suite.scenes[index], options_.scenes_folder);
-    report(Progress::Kind::kStarted, scene.entry.name + ", reading");
-    std::optional<Failure> failure;
-    for (const std::string& file : scene.scene_files())
-      if (!failure) failure = look_at_file(file, scene);
-    usable_.push_back(!failure);
-    results_.scenes.push_back({scene, {}});
-    if (failure && !stopped()) fail(std::move(*failure));
-  }
-
-  std::optional<Failure> look_at_file(const std::string& file, SceneInstance& scene) const {
-    std::vector<std::string> command{options_.program, "info", file, "--json"};
-    for (const std::string& define : scene.entry.defines) command.insert(command.end(), {"-D", define});
-    const ProcessResult process = run_process(command, options_.stop);
-    std::string message = process.errors;
-    if (process.ok()) try {
-        const nlohmann::json info = nlohmann::json::parse(process.output);
-        scene.hash += info.at("scene_hash");
-        place(scene, info.at("frame").at(0), info.at("frame").at(1), options_.max_pixels);
-        return std::nullopt;
-      } catch (const std::exception& error) {
-        message = error.what();
-      }
-    command[0] = "covary";
-    return Failure{scene.entry.name, "", "", shell_text(command), message, process.exit_code, 0};
+    const std::string& name = results_.suite.scenes[index].name;
+    report(Progress::Kind::kStarted, name + ", reading");
+    ScenePlan plan =
+        plan_scene(results_.suite, index, options_.scenes_folder, options_.max_pixels, options_.context, *reader_);
+    usable_.push_back(!plan.failure);
+    results_.scenes.push_back({std::move(plan.scene), {}});
+    references_.push_back(std::move(plan.references));
+    runs_.push_back(std::move(plan.runs));
+    if (plan.failure && !stopped()) fail(std::move(*plan.failure));
   }
 
   void plan() {
@@ -141,10 +122,6 @@ class Experiment {
     references_.resize(results_.scenes.size());
     for (size_t s = 0; s < results_.scenes.size(); ++s) {
       if (!usable_[s]) continue;
-      const SceneInstance& scene = results_.scenes[s].scene;
-      if (results_.suite.reference_of(scene.entry).files.empty())
-        references_[s] = reference_runs(results_.suite, scene, options_.context);
-      runs_[s] = runs_of_scene(results_.suite, s, scene, options_.context);
       if (options_.part.of > 0) keep_part(s);
       for (const std::vector<Run>* runs : {&references_[s], &runs_[s]})
         for (const Run& run : *runs) ++total_, clock_.add_planned(run.work);
@@ -376,6 +353,7 @@ class Experiment {
   }
 
   const ExperimentOptions& options_;
+  std::shared_ptr<SceneReader> reader_;
   Cache cache_;
   Runner runner_;
   Results results_;
@@ -390,8 +368,7 @@ class Experiment {
 }  // namespace
 
 Results run_experiment(const Suite& suite, const ExperimentOptions& options) {
-  const std::vector<std::string> problems = validate(suite);
-  if (!problems.empty()) throw Error(ErrorCode::kUsage, fmt::format("{}", fmt::join(problems, "\n")));
+  throw_if_invalid(suite);
   return Experiment(suite, options).run();
 }
 

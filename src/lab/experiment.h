@@ -5,9 +5,11 @@
 
 #include <atomic>
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "lab/results.h"
+#include "lab/scene_plan.h"
 
 namespace covary::lab {
 
@@ -30,8 +32,9 @@ struct ExperimentOptions {
   std::string cache_folder;
   std::string scenes_folder;  ///< folder in which the suite's scene files are looked up
   PlanContext context;
-  int64_t max_pixels = 0;  ///< > 0: frames are scaled down to this many pixels
-  int threads = 0;         ///< of each render; 0: the default
+  int64_t max_pixels = 0;                         ///< > 0: frames are scaled down to this many pixels
+  int threads = 0;                                ///< of each render; 0: the default
+  std::shared_ptr<SceneReader> reader = nullptr;  ///< to share between experiments; null: one of its own
   bool keep_passes = false;
   Part part;                                ///< makes and keeps only this part's runs, and measures nothing
   const std::atomic<bool>* stop = nullptr;  ///< stops after the run in progress has saved its state

@@ -25,38 +25,63 @@ void keep(const char* what, const std::vector<std::string>& names, std::vector<E
   std::erase_if(entries, [&](const Entry& e) { return std::find(names.begin(), names.end(), e.name) == names.end(); });
 }
 
-/// The centre of a crop, with at most kQuickCropPixels; anything else unchanged.
-std::string quick_crop(const std::string& crop) {
-  const std::vector<int> size = whole_numbers(crop, 'x'), window = whole_numbers(crop, ',');
-  const bool in_the_middle = size.size() == 2;
-  if (!in_the_middle && window.size() != 4) return crop;
-  const int width = in_the_middle ? size[0] : window[2], height = in_the_middle ? size[1] : window[3];
-  const double pixels = static_cast<double>(width) * height;
-  if (pixels <= static_cast<double>(kQuickCropPixels)) return crop;
-  const double factor = std::sqrt(static_cast<double>(kQuickCropPixels) / pixels);
-  const int w = std::max(1, static_cast<int>(std::lround(factor * width))),
-            h = std::max(1, static_cast<int>(std::lround(factor * height)));
-  if (in_the_middle) return fmt::format("{}x{}", w, h);
-  return fmt::format("{},{},{},{}", window[0] + (width - w) / 2, window[1] + (height - h) / 2, w, h);
+/// The text of a size, smaller by `factor`.
+std::pair<int, int> scaled(int width, int height, double factor) {
+  return {std::max(1, static_cast<int>(std::lround(factor * width))),
+          std::max(1, static_cast<int>(std::lround(factor * height)))};
 }
 
-void make_quick(Suite& suite) {
-  constexpr size_t kSeeds = 3;
-  constexpr uint32_t kSpp = 192, kReferenceSpp = 1024;
-  if (suite.seeds.size() > kSeeds) suite.seeds.resize(kSeeds);
-  std::erase_if(suite.budgets, [&](const Budget& b) { return b.spp > kSpp; });
-  if (suite.budgets.empty()) suite.budgets.push_back({kSpp, 0});
-  suite.reference.spp = std::min(suite.reference.spp, kReferenceSpp);
+/// What lengths of an area are to be multiplied with, so that it has at most `most` pixels.
+double factor_for(int width, int height, int64_t most) {
+  const double pixels = static_cast<double>(width) * height;
+  return pixels <= static_cast<double>(most) ? 1 : std::sqrt(static_cast<double>(most) / pixels);
+}
+
+/// "WIDTHxHEIGHT" of at most `most` pixels; anything else unchanged.
+std::string quick_size(const std::string& text, int64_t most) {
+  const std::vector<int> size = whole_numbers(text, 'x');
+  if (size.size() != 2) return text;
+  const auto [w, h] = scaled(size[0], size[1], factor_for(size[0], size[1], most));
+  return fmt::format("{}x{}", w, h);
+}
+
+/// The centre of a crop, with at most `most` pixels; anything else unchanged.
+std::string quick_crop(const std::string& crop, int64_t most) {
+  const std::vector<int> window = whole_numbers(crop, ',');
+  if (window.size() != 4) return quick_size(crop, most);
+  const auto [w, h] = scaled(window[2], window[3], factor_for(window[2], window[3], most));
+  return fmt::format("{},{},{},{}", window[0] + (window[2] - w) / 2, window[1] + (window[3] - h) / 2, w, h);
+}
+
+void make_quick(const QuickLimits& limits, Suite& suite) {
+  if (suite.seeds.size() > limits.seeds) suite.seeds.resize(limits.seeds);
+  if (limits.scenes > 0 && suite.scenes.size() > limits.scenes) suite.scenes.resize(limits.scenes);
+  std::erase_if(suite.budgets, [&](const Budget& b) { return b.spp > limits.spp; });
+  if (suite.budgets.empty()) suite.budgets.push_back({limits.spp, 0});
+  if (limits.seconds > 0)
+    for (Budget& budget : suite.budgets) budget.seconds = std::min(budget.seconds, limits.seconds);
+  suite.reference.spp = std::min(suite.reference.spp, limits.reference_spp);
   for (SceneEntry& scene : suite.scenes) {
-    if (scene.reference) scene.reference->spp = std::min(scene.reference->spp, kReferenceSpp);
-    scene.crop = quick_crop(scene.crop);
+    if (scene.reference) scene.reference->spp = std::min(scene.reference->spp, limits.reference_spp);
+    scene.crop = quick_crop(scene.crop, limits.crop_pixels);
+    if (limits.sized_pixels > 0) scene.resolution = quick_size(scene.resolution, limits.sized_pixels);
   }
+}
+
+/// Only the named methods, and the baseline.
+void keep_methods(std::vector<std::string> names, Suite& suite) {
+  if (names.empty()) return;
+  names.push_back(suite.baseline);
+  keep("method", names, suite.methods);
 }
 
 /// Checks that need no scene sizes.
 void check_sizes(const Overrides& o) {
-  if (!o.resolution.empty() && whole_numbers(o.resolution, 'x').size() != 2)
-    throw Error(ErrorCode::kUsage, fmt::format("`resolution` '{}': expected WIDTHxHEIGHT", o.resolution));
+  for (const auto& [name, text] : {std::pair{"resolution", o.resolution}, {"size", o.size}})
+    if (!text.empty() && whole_numbers(text, 'x').size() != 2)
+      throw Error(ErrorCode::kUsage, fmt::format("`{}` '{}': expected WIDTHxHEIGHT", name, text));
+  if (!o.size.empty() && (!o.resolution.empty() || !o.crop.empty()))
+    throw Error(ErrorCode::kUsage, "`size` renders whole frames; give it without `crop` and `resolution`");
   if (!o.crop.empty() && whole_numbers(o.crop, 'x').size() != 2 && whole_numbers(o.crop, ',').size() != 4)
     throw Error(ErrorCode::kUsage,
                 fmt::format("`crop` '{}': expected X,Y,WIDTH,HEIGHT, or a centred WIDTHxHEIGHT", o.crop));
@@ -64,21 +89,24 @@ void check_sizes(const Overrides& o) {
 
 }  // namespace
 
+int64_t most_pixels(const Overrides& o) {
+  const std::vector<int> size = whole_numbers(o.size, 'x');
+  if (size.size() == 2) return static_cast<int64_t>(size[0]) * size[1];
+  return o.quick ? o.quick->pixels : 0;
+}
+
 void apply(const Overrides& o, Suite& suite) {
   check_sizes(o);
-  if (o.quick) make_quick(suite);
+  if (o.quick) make_quick(*o.quick, suite);
   if (!o.baseline.empty()) suite.baseline = o.baseline;
   if (!o.scenes.empty()) keep("scene", o.scenes, suite.scenes);
-  if (!o.methods.empty()) {
-    std::vector<std::string> methods = o.methods;
-    methods.push_back(suite.baseline);
-    keep("method", methods, suite.methods);
-  }
+  keep_methods(o.methods.empty() && o.quick ? o.quick->methods : o.methods, suite);
   if (!o.seeds.empty()) suite.seeds = o.seeds;
   if (!o.budgets.empty()) suite.budgets = o.budgets;
   if (suite.show && std::find(suite.budgets.begin(), suite.budgets.end(), *suite.show) == suite.budgets.end())
     suite.show.reset();
   for (SceneEntry& scene : suite.scenes) {
+    if (!o.size.empty()) scene.crop.clear(), scene.resolution.clear();
     if (!o.crop.empty()) scene.crop = o.crop;
     if (!o.resolution.empty()) scene.resolution = o.resolution;
     if (o.reference_spp || !o.reference_files.empty()) scene.reference.reset();

@@ -10,21 +10,34 @@
 
 namespace covary::lab {
 
+/// What is left of a suite in a quick experiment.
+struct QuickLimits {
+  size_t seeds = 3;
+  uint32_t spp = 192;
+  uint32_t reference_spp = 1024;  ///< of each half
+  double seconds = 0;             ///< of budgets in seconds; 0: no limit
+  int64_t pixels = 32400;         ///< of frames that the suite neither sizes nor crops
+  int64_t crop_pixels = 12000;
+  int64_t sized_pixels = 0;               ///< of frames that the suite sizes; 0: no limit
+  size_t scenes = 0;                      ///< the first of them; 0: all
+  std::vector<std::string> methods = {};  ///< only these, and the baseline; empty: all
+};
+
 struct Overrides {
   std::vector<uint64_t> seeds;
   std::vector<Budget> budgets;
   std::string crop, resolution;      ///< of every scene
+  std::string size;                  ///< WIDTHxHEIGHT: whole frames, in their own shape, of at most as many pixels
   std::vector<std::string> scenes;   ///< only these
   std::vector<std::string> methods;  ///< only these, and the baseline
   std::string baseline;
   std::optional<uint32_t> reference_spp;
   std::vector<std::string> reference_files;  ///< of every scene
-  /// At most 3 seeds, 192 samples per pixel, 1024 in each half of a reference, crops of kQuickCropPixels.
-  bool quick = false;
+  std::optional<QuickLimits> quick;
 };
 
-/// In a quick experiment, maximum number of pixels of frames that the suite neither sizes nor crops, and of its crops.
-inline constexpr int64_t kQuickPixels = 32400, kQuickCropPixels = 12000;
+/// Maximum number of pixels of frames that the suite neither sizes nor crops; 0: no limit.
+int64_t most_pixels(const Overrides& overrides);
 
 /// Throws Error(kUsage) if a named scene or method is not in the suite, or for invalid sizes.
 void apply(const Overrides& overrides, Suite& suite);

@@ -173,7 +173,7 @@ TEST(Overrides, TakeThePlaceOfTheSuitesOwn) {
   suite.show = Budget{48, 0};
   suite.published_ratio["room"]["iicv"]["24"] = 2;
   Overrides overrides;
-  overrides.quick = true;
+  overrides.quick.emplace();
   overrides.methods = {"pt"};
   overrides.budgets = {{0, 3}};
   overrides.crop = "8x8";
@@ -196,7 +196,7 @@ TEST(Overrides, QuickMakesSmaller) {
   suite.budgets = {{48, 0}, {1536, 0}};
   suite.reference.spp = 8192;
   Overrides overrides;
-  overrides.quick = true;
+  overrides.quick.emplace();
   apply(overrides, suite);
   EXPECT_EQ(suite.seeds.size(), 3u);
   EXPECT_EQ(suite.budgets, (std::vector<Budget>{{48, 0}}));
@@ -208,7 +208,7 @@ TEST(Overrides, QuickKeepsTheMiddleOfCrops) {
     Suite suite = two_methods();
     suite.scenes[0].crop = crop;
     Overrides overrides;
-    overrides.quick = true;
+    overrides.quick.emplace();
     overrides.crop = given;
     apply(overrides, suite);
     return suite.scenes[0].crop;

@@ -2,6 +2,7 @@
 #include "lab/suite.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -150,6 +151,11 @@ std::vector<std::string> validate(const Suite& suite) {
   return problems;
 }
 
+void throw_if_invalid(const Suite& suite) {
+  const std::vector<std::string> problems = validate(suite);
+  if (!problems.empty()) throw Error(ErrorCode::kUsage, fmt::format("{}", fmt::join(problems, "\n")));
+}
+
 Json to_json(const Suite& suite) {
   Json json{{"name", suite.name}, {"title", suite.title}};
   if (!suite.description.empty()) json["description"] = suite.description;
@@ -171,17 +177,34 @@ Json to_json(const Suite& suite) {
   return json;
 }
 
+namespace {
+
+/// The first of the current folder, the source tree and the installation that has `file`, with `root`; or "".
+std::string folder_with(const std::string& root, const std::string& file, const std::string& program) {
+  const fs::path beside = fs::path(program).parent_path();
+  for (const fs::path& base : {fs::current_path(), beside / ".." / "..", beside / ".." / "share" / "covary"})
+    if (fs::exists(base / root / file)) return (base / root).lexically_normal().string();
+  return "";
+}
+
+}  // namespace
+
 std::string scenes_folder(const Suite& suite, const std::string& word, const std::string& program) {
   const fs::path given(word);
   if (given.extension() == ".json") return (fs::absolute(given).parent_path() / suite.scene_root).string();
   if (given.extension() == ".xml" || suite.scenes.empty()) return fs::current_path().string();
-  const fs::path beside = fs::path(program).parent_path();
   if (!suite.scene_root.empty())
-    for (const fs::path& base : {fs::current_path(), beside / ".." / "..", beside / ".." / "share" / "covary"})
-      if (fs::exists(base / suite.scene_root / suite.scenes[0].file))
-        return (base / suite.scene_root).lexically_normal().string();
+    if (std::string folder = folder_with(suite.scene_root, suite.scenes[0].file, program); !folder.empty())
+      return folder;
   throw Error(ErrorCode::kUsage, fmt::format("the suite '{}' needs --scenes DIR, the folder that holds {}", suite.name,
                                              suite.scenes[0].file));
+}
+
+std::string own_scenes_folder(const std::string& program) {
+  if (std::string folder = folder_with("scenes", "room.xml", program); !folder.empty()) return folder;
+  throw Error(ErrorCode::kUsage,
+              "the scenes of covary are not found; run the command where the folder `scenes` of its "
+              "source tree is");
 }
 
 }  // namespace covary::lab

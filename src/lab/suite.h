@@ -95,6 +95,8 @@ Suite parse_suite(const std::string& text, const std::string& name, const Comman
 
 /// All problems of the suite as a whole, after overrides; empty if it can be run.
 std::vector<std::string> validate(const Suite& suite);
+/// Throws Error(kUsage) with all problems, if there are any.
+void throw_if_invalid(const Suite& suite);
 
 nlohmann::ordered_json to_json(const Suite& suite);
 
@@ -102,6 +104,10 @@ nlohmann::ordered_json to_json(const Suite& suite);
 /// scene. For a built-in suite, it is searched here, and in the source tree and installation that contain `program`,
 /// the path of `covary`. `word` names the suite on the command line. Throws Error(kUsage) if there is none.
 std::string scenes_folder(const Suite& suite, const std::string& word, const std::string& program);
+
+/// The folder of the scenes that come with the program: in the current folder, or in the source tree or installation
+/// that contain `program`. Throws Error(kUsage) if there is none.
+std::string own_scenes_folder(const std::string& program);
 
 // Suites built into the program: suites/*.json of the source tree.
 

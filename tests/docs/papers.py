@@ -92,6 +92,10 @@ class Tree:
     def find(self, path):
         return next((at for at in (self.root / path, self.root / "src" / path) if at.is_file()), None)
 
+    def find_suite(self, name):
+        """A suite, or a paper of several."""
+        return self.find(f"suites/{name}.json") or self.find(f"suites/papers/{name}.json")
+
     def _code(self, path):
         """Without comments."""
         text = read(path)
@@ -135,7 +139,7 @@ def of_code(words, tree):
         elif name.startswith("--"):
             yield from of_options(name, tree)
         elif match := re.match(r"covary experiment ([\w-]+)$", name):
-            if not tree.find(f"suites/{match[1]}.json"):
+            if not tree.find_suite(match[1]):
                 yield f"there is no suite {match[1]}"
         elif re.fullmatch(r"[A-Za-z_][\w:]*", name) and name not in tree.literals():
             yield f"{name} has no file: `{name}` in `folder/file.cpp`"
@@ -210,7 +214,7 @@ def problems(page, text, tree):
     for head, rows in tables(text):
         found += of_table(page, head, rows, tree)
     for name in re.findall(r"^    covary experiment ([\w-]+)", text, re.M):
-        if not tree.find(f"suites/{name}.json"):
+        if not tree.find_suite(name):
             found.append((0, f"there is no suite {name}"))
     for path in re.findall(rf"^    ({PATH}) ", text, re.M):
         if not tree.find(path):

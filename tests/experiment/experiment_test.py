@@ -646,7 +646,7 @@ class References(ExperimentTest):
 class BuiltIn(ExperimentTest):
     def test_list(self):
         names = [line.split()[0] for line in self.run_covary([COVARY, "experiment", "--list"]).stdout.splitlines()]
-        self.assertEqual(set(names), {path.stem for path in SUITES.glob("*.json")})
+        self.assertEqual(set(names), {path.stem for path in [*SUITES.glob("*.json"), *SUITES.glob("papers/*.json")]})
         done = self.run_covary([COVARY, "experiment", "iicv-table1", "--print", "--scenes-only", "house", "--seeds",
                                 "2"])
         suite = json.loads(done.stdout)
@@ -674,6 +674,64 @@ class BuiltIn(ExperimentTest):
         self.assertEqual(done.returncode, 0, done.stderr)
         width, height = json.loads((self.path / "out" / "results.json").read_text())["scenes"][0]["frame"]
         self.assertEqual((width, height), (220, 146))
+
+
+class Papers(ExperimentTest):
+    """A paper's tables and figures, as small as can be."""
+
+    def paper(self, *arguments, out="out"):
+        small = ("--seeds", "1", "--reference-spp", "16", "--threads", "2", "--resolution", "16x12")
+        return self.run_covary([COVARY, "experiment", *arguments, *small, "-o", out])
+
+    def test_parts_make_one_report_and_go_on(self):
+        scenes = self.path / "scenes"
+        (scenes / "bathroom2").mkdir(parents=True)
+        (scenes / "bathroom2" / "scene_v3.xml").write_text((SCENES / "room.xml").read_text())
+        command = ("iicv", "--only", "fig6,fig12", "--scenes", str(scenes), "--quick", "--spp", "24", "--crop", "16x12",
+                   "--methods-only", "pt", "iicv-paper", "iicv-paper 1:1")
+        done = self.paper(*command)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("of the paper's scenes are missing in", done.stderr)
+        self.assertIn("  glass-of-water/scene_v3.xml, in fig", done.stderr)
+        self.assertIn("Scenes of covary take their place in fig2", done.stderr)
+        self.assertRegex(done.stderr, r"fig6 +about +\S+.*, \d+ runs: Fig\. 6")
+        self.assertRegex(done.stderr, r"together +about ")
+        data = json.loads((self.path / "out" / "results.json").read_text())
+        self.assertEqual(data["paper"], "iicv")
+        parts = {part["names"][0]: part for part in data["parts"]}
+        self.assertEqual((set(parts), parts["fig2"]["own_scenes"]), ({"fig6", "fig2"}, True))
+        self.assertEqual([s["name"] for s in parts["fig2"]["results"]["scenes"]], ["room", "materials"])
+        page = (self.path / "out" / "report.html").read_text()
+        self.assertIn("fig2-summary", page)
+        for name in ("fig2", "fig6"):
+            for file in ("report.html", "results.json", "results.csv"):
+                self.assertTrue((self.path / "out" / name / file).exists(), (name, file))
+        runs = self.runs()
+        done = self.paper(*command)
+        self.assertEqual((done.returncode, self.runs()), (0, runs), done.stderr)
+        self.assertRegex(done.stderr, r"fig6 +about +0:00, (\d+) runs, \1 made before")
+
+    def test_mistakes(self):
+        for message, *words in (
+                ("'iicv' has no part 'tabel1'; did you mean 'table1'", "iicv", "--only", "tabel1"),
+                ("--only chooses parts of a paper (controlled-mixtures, dependent-tests, iicv); 'quick' is a suite",
+                 "quick", "--only", "table1"),
+                ("--size renders whole frames; give it without --crop and --resolution", "iicv", "--size", "64x36"),
+                ("did you mean 'iicv'", "iicw")):
+            done = self.paper(*words)
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertIn(message, done.stderr)
+
+    def test_size_renders_whole_frames(self):
+        command = [COVARY, "experiment", "dependent-tests", "--only", "fig1"]
+        done = self.run_covary([*command, "--size", "20x20", "--print"])
+        for scene in json.loads(done.stdout)[0]["scenes"]:
+            self.assertNotIn("resolution", scene)
+        done = self.run_covary([*command, "--size", "24x16", "--spp", "4", "--seeds", "1", "--reference-spp", "4",
+                                "--methods-only", "dependent", "--scenes-only", "box", "-o", "out"])
+        self.assertEqual(done.returncode, 0, done.stderr)
+        results = json.loads((self.path / "out" / "fig1" / "results.json").read_text())
+        self.assertEqual(results["scenes"][0]["frame"], [19, 19], "in the scene's own shape")
 
 
 if __name__ == "__main__":

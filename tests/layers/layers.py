@@ -28,6 +28,7 @@ ARROWS = {
     "gpu": ["device", "dependent_tests", "denoising"],
     "combine": ["gpu"],
     "lab": ["report", "sequences"],
+    "papers": ["lab"],
     "report": ["metrics"],
     "scene": ["settings"],
     "textures": ["scene", "imageio"],

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "experiment_run.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <sstream>
+
+#include "combine/registry.h"
+#include "commands.h"
+#include "core/content_hash.h"
+#include "core/error.h"
+#include "film/output_file.h"
+#include "film/outputs.h"
+#include "interruption.h"
+#include "json_output.h"
+#include "lab/report_document.h"
+#include "lab/suite.h"
+#include "progress.h"
+#include "render_options.h"
+#include "version.h"
+
+namespace covary {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Version and commit; plus a hash of the program's content if the commit does not identify the build.
+std::string program_version() {
+  std::string text = version_text();
+  if (!text.ends_with(')') || text.ends_with("-dirty)")) text += " " + hash_text(hash_bytes(read_file(program_path())));
+  return text;
+}
+
+/// A method's options parsed as by `covary render`, with or without frames.
+RenderOptions parsed(std::vector<std::string> words, bool of_frames) {
+  CLI::App command;
+  RenderOptions options;
+  add_render_options(command, options);
+  words.insert(words.end(), {"scene.xml", "-o", "out_#.exr"});
+  if (of_frames) words.insert(words.end(), {"--frames", "1"});
+  std::reverse(words.begin(), words.end());
+  command.parse(words);
+  return options;
+}
+
+/// The experiment's progress, on a separate line; failures stay above it.
+void show_progress(const lab::Progress& p, const std::string& name, ProgressLine& line) {
+  if (p.kind == lab::Progress::Kind::kFailed) {
+    line.clear();
+    fmt::print(stderr, "failed: {}{}\n", name, p.what);
+    return;
+  }
+  const std::string left = p.seconds_left > 0 ? ", " + format_duration(p.seconds_left) + " left" : "";
+  line.show(fmt::format("[{}/{}{}] {}{}", p.done, p.total, left, name, p.what));
+}
+
+lab::PlanContext plan_context(const lab::Programs& programs) {
+  return {program_version(),
+          [](const std::vector<std::string>& words) {
+            const RenderOptions options = parsed(words, true);
+            return pass_words(options.values, options.of_integrator, options.of_estimator);
+          },
+          programs};
+}
+
+/// Whether the file holds results of an experiment: "format" is the first key.
+bool is_results(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string text(200, '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  return text.find(lab::kResultsFormat) != std::string::npos;
+}
+
+}  // namespace
+
+std::string read_file(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw Error(ErrorCode::kIo, "cannot open '" + path + "'");
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+void make_folder(const std::string& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw Error(ErrorCode::kIo, fmt::format("cannot make the folder {}: {}", folder, error.message()));
+}
+
+void check_files(const ExperimentCommand& command, const lab::Suite& suite, const std::string& scenes,
+                 const std::string& folder) {
+  Outputs outputs;
+  outputs.reads(command.suite);
+  for (const lab::SceneEntry& scene : suite.scenes) {
+    const lab::SceneInstance located = lab::located(scene, scenes);
+    outputs.reads(located.scene_files());
+    if (!located.camera_path.empty()) outputs.reads(located.camera_path);
+    for (const std::string& file : suite.reference_of(scene).files)
+      outputs.reads(lab::files_of(located.frames, (fs::path(scenes) / file).string()));
+  }
+  outputs.writes("-o", folder + kResults, OutputKind::kText);
+  outputs.writes("-o", folder + kTable, OutputKind::kText);
+  outputs.writes("-o", folder + kReport, OutputKind::kPage);
+  for (const char* name : {kResults, kTable, kReport})
+    if (fs::exists(folder + name) && !is_results(folder + kResults))
+      throw Error(
+          ErrorCode::kUsage,
+          fmt::format("-o '{0}': {0}{1} exists and was not made by an experiment; give another folder, or one that an "
+                      "experiment has written to",
+                      folder, name));
+}
+
+void check_methods(const lab::Suite& suite, const lab::Programs& programs) {
+  if (!lab::validate(suite).empty()) return;
+  const bool of_frames = std::any_of(suite.scenes.begin(), suite.scenes.end(),
+                                     [](const lab::SceneEntry& scene) { return !scene.frames.empty(); });
+  std::vector<std::string> problems;
+  for (const lab::MethodEntry& method : suite.methods) {
+    std::vector<std::string> words = suite.common_options;
+    words.insert(words.end(), method.options.begin(), method.options.end());
+    try {
+      RenderOptions options = parsed(words, of_frames);
+      check_options(options);
+    } catch (const std::runtime_error& error) {
+      problems.push_back(fmt::format("method '{}': {}", method.name, error.what()));
+    }
+    if (!method.program.empty() && !programs.contains(method.program))
+      problems.push_back(fmt::format("method '{}' is made by a program of your own: give --{} {}=COMMAND", method.name,
+                                     method.renders ? "program" : "renderer", method.program));
+  }
+  if (!problems.empty()) throw Error(ErrorCode::kUsage, fmt::format("{}", fmt::join(problems, "\n")));
+}
+
+lab::ExperimentOptions run_options(const ExperimentCommand& command, const std::string& scenes,
+                                   const lab::Programs& programs) {
+  lab::ExperimentOptions options;
+  options.program = program_path();
+  options.cache_folder = fs::absolute(command.cache.empty() ? command.output + "/cache" : command.cache).string();
+  options.scenes_folder = scenes;
+  options.context = plan_context(programs);
+  options.max_pixels = lab::most_pixels(command.overrides);
+  options.threads = command.threads;
+  options.keep_passes = command.keep_passes;
+  options.part = command.the_part;
+  return options;
+}
+
+lab::Results run_suite(const lab::Suite& suite, lab::ExperimentOptions options, const std::string& name, bool quiet) {
+  ProgressLine progress("", quiet);
+  std::optional<StopFlag> stop(std::in_place);
+  options.stop = stop->token();
+  options.progress = [&](const lab::Progress& p) { show_progress(p, name, progress); };
+  lab::Results results = lab::run_experiment(suite, options);
+  stop.reset();
+  progress.finish();
+  return results;
+}
+
+Written write_results(lab::Results results, const std::string& version, const std::string& folder) {
+  results.version = version;
+  results.command = command_line();
+  results.date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+  results.machine = lab::machine_facts();
+  const nlohmann::ordered_json json = to_json(results);
+  write_text_file(folder + kResults, json_text(json, 1));
+  write_text_file(folder + kTable, lab::to_csv(json));
+  Written written{std::move(results), {}, {}};
+  written.document = lab::report_document(written.results);
+  lab::add_pictures(written.results, written.document, written.pictures);
+  write_report(folder + kReport, written.document, written.pictures);
+  return written;
+}
+
+void print_summary(const lab::Results& results, const std::string& folder) {
+  const lab::Suite& suite = results.suite;
+  fmt::print(stderr, "{:20} {:>10} {:>10} {:>12} {:>14} {:>14}\n", "method", "budget", "spp taken", "relMSE",
+             "equal samples", "equal time");
+  const auto factor = [](double value) {
+    return std::isfinite(value) ? fmt::format("{:.2f}x", value) : std::string("-");
+  };
+  for (const lab::Summary& s : results.summaries)
+    fmt::print(stderr, "{:20} {:>10} {:>10.4g} {:>12.4g} {:>14} {:>14}\n", suite.methods[s.method].name,
+               suite.budgets[s.budget].label(), s.samples_per_pixel, s.relmse, factor(s.equal_sample.value),
+               factor(s.equal_time.value));
+  for (const std::string& verdict : lab::verdicts(results, lab::shown_budget(suite)))
+    fmt::print(stderr, "{}\n", verdict);
+  for (const std::string& warning : results.warnings) fmt::print(stderr, "warning: {}\n", warning);
+  fmt::print(stderr, "{}/report.html, results.json, results.csv\n", folder);
+}
+
+void throw_if_failed(size_t n_failures, const ExperimentCommand& command) {
+  if (n_failures == 0) return;
+  throw Error(
+      ErrorCode::kInput,
+      fmt::format("{} of the experiment's parts failed; {} which and why, and the same command tries them again",
+                  n_failures, command.the_part.of == 0 ? command.output + "/results.json says" : "above stands"));
+}
+
+}  // namespace covary

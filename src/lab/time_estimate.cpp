@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/time_estimate.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <set>
+#include <thread>
+
+#include "lab/runner.h"
+
+namespace covary::lab {
+namespace {
+
+/// Side of the square in the middle of the pixels that is rendered, and samples of each pixel.
+constexpr int kTrialSide = 48;
+constexpr uint32_t kTrialSpp = 16;
+/// Of a run apart from loading and rendering: starting the program, writing and measuring the image.
+constexpr double kSecondsAround = 0.3;
+
+/// The window's middle.
+CropWindow middle(const CropWindow& window) {
+  const int width = std::min(kTrialSide, window.width), height = std::min(kTrialSide, window.height);
+  return {window.x + (window.width - width) / 2, window.y + (window.height - height) / 2, width, height};
+}
+
+}  // namespace
+
+TimeEstimator::TimeEstimator(const ExperimentOptions& options) : options_(options) {
+  if (!options_.reader) options_.reader = std::make_shared<SceneReader>(options_.program, options_.stop);
+}
+
+std::optional<TimeEstimator::Speed> TimeEstimator::speed_of(const Suite& suite, const SceneInstance& scene,
+                                                            const Runner& runner) {
+  const std::string key = fmt::format("{} {}x{} {} {}", scene.hash, scene.frame_width, scene.frame_height,
+                                      fmt::join(scene.entry.defines, " "), fmt::join(suite.common_options, " "));
+  if (const auto known = speeds_.find(key); known != speeds_.end()) return known->second;
+  Suite trial = suite;
+  trial.reference = {kTrialSpp, {}};
+  SceneInstance part = scene;
+  part.entry.reference.reset();
+  part.window = middle(scene.window);
+  if (!part.frames.empty()) part.frames = {scene.frames.front()}, part.entry.frames = fmt::format("{}", part.frames[0]);
+  const Run run = reference_runs(trial, part, options_.context).front();
+  std::optional<RunRecord> record = runner.find(run);
+  if (!record) record = runner.execute(run, part).record;
+  runner.remove_passes(run.passes_key);
+  std::optional<Speed> speed;
+  if (record) {
+    const double cores = options_.threads > 0 ? options_.threads : std::max(1u, std::thread::hardware_concurrency());
+    speed = Speed{record->processor_seconds / cores / run.work, record->load_seconds + kSecondsAround};
+  }
+  return speeds_.emplace(key, speed).first->second;
+}
+
+TimeEstimate TimeEstimator::of(const Suite& suite, int64_t max_pixels) {
+  throw_if_invalid(suite);
+  const Cache cache(options_.cache_folder);
+  const Runner runner(cache, options_.program, options_.threads, options_.stop);
+  const auto stopped = [this] { return options_.stop && options_.stop->load(); };
+  TimeEstimate estimate;
+  for (size_t s = 0; s < suite.scenes.size() && !stopped(); ++s) {
+    const ScenePlan plan = plan_scene(suite, s, options_.scenes_folder, max_pixels, options_.context, *options_.reader);
+    std::vector<const Run*> missing;
+    for (const std::vector<Run>* runs : {&plan.references, &plan.runs})
+      for (const Run& run : *runs) {
+        ++estimate.runs;
+        runner.find(run) ? void(++estimate.finished) : missing.push_back(&run);
+      }
+    const std::optional<Speed> speed =
+        plan.failure || missing.empty() ? std::nullopt : speed_of(suite, plan.scene, runner);
+    if (plan.failure || (!speed && !missing.empty())) estimate.complete = false;
+    if (!speed) continue;
+    std::set<std::string> rendered;  // passes
+    for (const Run* run : missing) {
+      const double work = rendered.insert(run->passes_key).second ? run->work : 0;
+      const double budget = run->timed ? suite.budgets[run->budget].seconds : 0;
+      estimate.seconds += budget + work * speed->seconds_per_sample + speed->seconds_per_run;
+    }
+  }
+  return estimate;
+}
+
+}  // namespace covary::lab

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// How long an experiment will take, before it starts.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include "lab/experiment.h"
+
+namespace covary::lab {
+
+struct TimeEstimate {
+  size_t runs = 0, finished = 0;  ///< references included; finished: in the cache
+  double seconds = 0;             ///< of those that are not finished
+  bool complete = true;           ///< false: scenes could not be read or rendered, and do not count
+};
+
+/// Renders a few pixels of each scene with few samples, once for all suites, and multiplies their processor time, as on
+/// a machine without other work. Assumes that a method takes the time of plain path tracing with the same samples, and
+/// that methods that share passes render them once: bidirectional paths, training and estimators take longer.
+class TimeEstimator {
+ public:
+  explicit TimeEstimator(const ExperimentOptions& options);
+  /// max_pixels: as in ExperimentOptions. Throws what run_experiment() throws. The cache must not be in use.
+  TimeEstimate of(const Suite& suite, int64_t max_pixels);
+
+ private:
+  struct Speed {
+    double seconds_per_sample = 0, seconds_per_run = 0;
+  };
+  std::optional<Speed> speed_of(const Suite& suite, const SceneInstance& scene, const Runner& runner);
+
+  ExperimentOptions options_;
+  std::map<std::string, std::optional<Speed>> speeds_;  // by key of the trial without its pixels
+};
+
+}  // namespace covary::lab
