@@ -30,6 +30,7 @@
 #include "film/film_file.h"
 #include "film/outputs.h"
 #include "frame_files.h"
+#include "gpu/target.h"
 #include "guide_layer.h"
 #include "json_output.h"
 #include "method_options.h"
@@ -51,18 +52,21 @@ struct CombineOptions : CombineSettings {
   std::string stages, json, view;
   bool quiet = false, overwrite = false;
   int threads = 0;
+  MethodTarget target;  ///< of `device`
 };
 
 Method estimator_of(const CombineOptions& o) {
-  if (o.estimator == kDefaultEstimator) return make_default_estimator(!o.crn.empty(), o.of_estimator, o.denoising);
-  return with_denoising(make_estimator(o.estimator, o.of_estimator), o.denoising);
+  if (o.estimator == kDefaultEstimator)
+    return make_default_estimator(!o.crn.empty(), o.of_estimator, o.denoising, o.target);
+  return with_denoising(make_estimator(o.estimator, o.of_estimator, o.target), o.denoising, o.target);
 }
 
 std::vector<std::string> write(const CombineOptions& o, const CombineRequest& request, const ResultSource& source,
                                CombinedImage& combined) {
   std::map<std::string, std::string> attributes = inherited_attributes(o.independent);
-  for (const char* of_pass : {"covary:sampling", "covary:samples"}) attributes.erase(of_pass);
+  for (const char* of_pass : {"covary:sampling", "covary:samples", "covary:device"}) attributes.erase(of_pass);
   attributes["covary:estimator"] = estimator_of(o).text;
+  if (o.target && !o.target->made_by().empty()) attributes["covary:device"] = o.target->made_by();
   attributes["covary:version"] = COVARY_VERSION;
   attributes["covary:command"] = command_line();
   const double crn = request.crn ? request.crn->samples : 0, independent = request.independent.samples;
@@ -238,6 +242,7 @@ nlohmann::ordered_json statistics(const CombineOptions& o, const CombineRequest&
     json["independent_predicted_relmse"] =
         predicted_relmse_of_mean(request.independent, std::max(1, rows_in_memory(request)));
   }
+  if (o.target) json["device"] = o.target->made_by().empty() ? gpu::kProcessor : o.target->made_by();
   if (request.light) json["light_groups"] = request.light->groups;
   add_risks(combined.image.risks, json);
   add_error_sums(combined.image.risk_sums, json);
@@ -333,6 +338,7 @@ void run(CombineOptions o) {
     if (!o.values.contains("denoise")) o.denoising.mode = usual_denoising(o.estimator);
   }
   check_passes(o);
+  o.target = gpu::Target::open(o.device);
   FramePatterns patterns{o.independent, {o.guides, o.light}, o.output, {o.independent_layer, o.view}};
   o.of_frames.quiet = o.quiet;
   patterns.images.insert(patterns.images.end(), o.crn.begin(), o.crn.end());

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/printable.h"
 #include "declared_options.h"
+#include "device/device_info.h"
 #include "film/pictures.h"
 #include "io/load_scene.h"
 #include "io/scene_file.h"
@@ -27,6 +28,7 @@ namespace {
 
 struct InfoOptions {
   std::string path;
+  bool devices = false;
   SceneOptions scene_options;
   bool json = false;
 };
@@ -116,7 +118,33 @@ void print_text(const ImageInfo& info, const std::string& path) {
   for (const auto& [name, value] : info.attributes) fmt::print("  {}: {}\n", printable(name), printable(value));
 }
 
+/// The devices that `--device` takes.
+void devices_info(const InfoOptions& options) {
+  if (!options.path.empty()) throw Error(ErrorCode::kUsage, "--devices tells of this machine; it takes no file");
+  std::vector<std::string> notes;
+  const std::vector<device::DeviceInfo> all = device::devices(&notes);
+  if (options.json) {
+    nlohmann::ordered_json list = nlohmann::ordered_json::array();
+    for (const device::DeviceInfo& d : all)
+      list.push_back({{"id", d.id()},
+                      {"name", d.name},
+                      {"driver", d.driver},
+                      {"is_processor", d.is_processor},
+                      {"units", d.units},
+                      {"memory_bytes", d.memory},
+                      {"largest_buffer_bytes", d.largest_buffer},
+                      {"local_memory_bytes", d.local_memory}});
+    return write_text_output("-", json_text({{"devices", list}, {"notes", notes}}, -1));
+  }
+  for (const device::DeviceInfo& d : all)
+    fmt::print("{}: {}{}, {} units, {}; {}\n", d.id(), printable(d.name), d.is_processor ? " (the processor)" : "",
+               d.units, bytes_text(static_cast<double>(d.memory)), printable(d.driver));
+  for (const std::string& note : notes) fmt::print("{}\n", printable(note));
+}
+
 void info(const InfoOptions& options) {
+  if (options.devices) return devices_info(options);
+  if (options.path.empty()) throw Error(ErrorCode::kUsage, "FILE is required, or --devices");
   if (is_scene_file(options.path)) return scene_info(options);
   if (!options.scene_options.defines.empty()) throw Error(ErrorCode::kUsage, "-D is for scene files (.xml)");
   const ImageInfo info = describe_image(options.path);
@@ -133,9 +161,9 @@ void info(const InfoOptions& options) {
 void add_info(CLI::App& app) {
   const auto options = std::make_shared<InfoOptions>();
   CLI::App* command = app.add_subcommand("info", "Describe a film, image or scene: size, channels, attributes");
-  add_value(*command, "FILE", options->path, kFileValue, "A film or image, or a scene file (.xml, .pbrt, .glb, .gltf)")
-      ->required();
+  add_value(*command, "FILE", options->path, kFileValue, "A film or image, or a scene file (.xml, .pbrt, .glb, .gltf)");
   add_scene_options(*command, options->scene_options);
+  command->add_flag("--devices", options->devices, "Instead, the GPUs and other devices that --device takes");
   command->add_flag("--json", options->json, "One JSON object");
   command->callback([options] { info(*options); });
 }

@@ -29,13 +29,14 @@ _LAYERS = optional(mapping_of(IMAGE, "a mapping from names to arrays"))
 
 @checked(crn=IMAGE, independent=IMAGE, estimator=text, light=IMAGE, counts=array,
          samples=optional(whole(1, _covary.most_samples)), denoise=DENOISE, albedo=array, normal=array,
-         denoising_albedo=array, denoising_normal=array, position=array, layers=_LAYERS, oidn=OIDN,
+         denoising_albedo=array, denoising_normal=array, position=array, layers=_LAYERS, oidn=OIDN, device=text,
          std_error=optional(flag), force=flag, progress=optional(function))
 def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, light: Film | None = None,
             counts: Any = None, samples: int | None = None, denoise: DenoiseMode | None = None, albedo: Any = None,
             normal: Any = None, denoising_albedo: Any = None, denoising_normal: Any = None, position: Any = None,
-            layers: Mapping[str, Any] | None = None, oidn: str | PathLike[str] = "", std_error: bool | None = None,
-            force: bool = False, progress: Progress | None = None, **options: OptionValue) -> Result:
+            layers: Mapping[str, Any] | None = None, oidn: str | PathLike[str] = "", device: str = "cpu",
+            std_error: bool | None = None, force: bool = False, progress: Progress | None = None,
+            **options: OptionValue) -> Result:
     """Combines `crn`, whose pixels share their random numbers, and `independent`, whose pixels do not, into one image.
 
     Each is a float32 array [T, H, W, 3], the means of T groups of samples (renders with different seeds), from NumPy,
@@ -58,6 +59,8 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, l
         folder, by default searched for; "off": not used.
     layers: parts of `independent` by name, such as direct light, in the same groups: denoised with it, they are in the
         result's aovs, and add up to its image with "Rest".
+    device: "cpu"; "auto", the first GPU, and the processor if there is none or it fails; "cuda" or "opencl", or one of
+        these devices, "opencl:1" (`covary info --devices`).
     std_error: estimate the error, too; by default if the estimator can.
     force: combine even if the checks of the inputs find errors.
     progress: called with (done, total) steps.
@@ -72,8 +75,8 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, l
         estimator = DEFAULT_OF_PAIRS  # type: ignore[assignment]  # whose options they are
     made = _covary.combine(crn, independent, None if counts is None else _counts(counts), light, albedo,
                            normal, denoising_albedo, denoising_normal, position, dict(layers or {}), estimator,
-                           text_options(options, estimator), denoise or "", fspath(oidn), force, std_error, samples,
-                           progress)
+                           text_options(options, estimator), denoise or "", fspath(oidn), device, force, std_error,
+                           samples, progress)
     return Result(**made | {"warnings": found + made["warnings"]})
 
 

@@ -165,7 +165,7 @@ _DECLARED = {name: rule for name, rule in _OPTIONS.items()
          scene=SCENE, spp=optional(SPP), estimator=optional(text), integrator=text, until=optional(real(0, above=True)),
          until_p95=optional(real(0, above=True)), until_relative=optional(real(0, above=True)),
          time=optional(real(0, above=True)), seed=SEED,
-         denoise=DENOISE, oidn=empty_or(path), output=optional(path), passes=optional(path), resume=flag,
+         denoise=DENOISE, oidn=empty_or(path), device=text, output=optional(path), passes=optional(path), resume=flag,
          overwrite=flag, checkpoint=optional(real(0)), preview=flag,
          crop=optional(several("(x, y, width, height) in pixels", whole(0, 65535), whole(0, 65535), whole(1, 65536),
                                whole(1, 65536))),
@@ -176,7 +176,7 @@ _DECLARED = {name: rule for name, rule in _OPTIONS.items()
 def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | None = None, *, integrator: str = "",
            until: float | None = None, until_p95: float | None = None, until_relative: float | None = None,
            time: float | None = None, seed: int = 0,
-           denoise: DenoiseMode | None = None, oidn: str | PathLike[str] = "",
+           denoise: DenoiseMode | None = None, oidn: str | PathLike[str] = "", device: str = "cpu",
            output: str | PathLike[str] | None = None, passes: str | PathLike[str] | None = None, resume: bool = False,
            overwrite: bool = False, checkpoint: float | None = None, preview: bool = False,
            crop: tuple[int, int, int, int] | None = None, filter: Filter | None = None,
@@ -192,8 +192,8 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     until: add samples until the predicted relMSE is this; until_p95: until it is in 95 % of the blocks of 16 x 16
         pixels; until_relative: until the relative error of each pixel (3 sigma) is, with `adaptive` or dependent-tests.
     time: seconds for rendering and estimating together.
-    denoise, oidn: as for combine(); the guides are rendered. The default is "auto", or "none" if an estimator or
-        `sampling` is given.
+    denoise, oidn, device: as for combine(); the guides are rendered. The default of denoise is "auto", or "none" if an
+        estimator or `sampling` is given.
     output: EXR file of the result; preview: write a PNG beside it.
     passes: folder to keep the films in; resume: continue existing films; overwrite: replace them;
         checkpoint: seconds between saving unfinished films, by default 300 with `output` or `passes`; 0: never.
@@ -226,9 +226,9 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
         "output": output, "spp": spp, "time": time, "seed": seed,
         "until": next((f"{name}={error!r}" for name, error in until_words.items() if error is not None), None),
         "integrator": loading["integrator"] or None, "estimator": estimator, "denoise": denoise,
-        "oidn": fspath(oidn) or None, "resolution": loading["resolution"], "crop": crop, "passes": passes,
-        "resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "no-preview": not preview, "split": split,
-        "rfilter": filter, **loading["view"], **declared})
+        "oidn": fspath(oidn) or None, "device": device, "resolution": loading["resolution"], "crop": crop,
+        "passes": passes, "resume": resume, "overwrite": overwrite, "checkpoint": checkpoint,
+        "no-preview": not preview, "split": split, "rfilter": filter, **loading["view"], **declared})
     properties = {"min_depth": loading["min_depth"], "max_depth": loading["max_depth"], **loading["integrator_options"]}
     of_integrator = {name.replace("_", "-"): {"True": "on", "False": "off"}.get(str(value), str(value))
                      for name, value in properties.items() if value is not None}

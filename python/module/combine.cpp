@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "denoising/mixed_denoising.h"
 #include "film/splat_layer.h"
+#include "gpu/target.h"
 #include "python/module/arrays.h"
 #include "python/module/bindings.h"
 #include "python/module/work.h"
@@ -147,7 +148,7 @@ struct Pair {
 struct CombineArguments {
   std::string estimator;
   OptionValues options;
-  std::string denoise, oidn;
+  std::string denoise, oidn, device;
   bool force = false;
   std::optional<bool> std_error;
   std::optional<int> samples;
@@ -215,10 +216,10 @@ const Film* film_of(nb::handle light) {
 
 /// The estimator for two images, or for an independent one that is denoised.
 Method estimator_of(bool is_pair, const std::string& name, const OptionValues& options,
-                    const DenoisingChoice& denoising) {
+                    const DenoisingChoice& denoising, const MethodTarget& target = {}) {
   if (name == kDefaultEstimator && (is_pair || denoising.denoises()))
-    return make_default_estimator(is_pair, options, denoising);
-  if (is_pair) return with_denoising(make_pair_estimator(name, options), denoising);
+    return make_default_estimator(is_pair, options, denoising, target);
+  if (is_pair) return with_denoising(make_pair_estimator(name, options, target), denoising, target);
   if (name != kDefaultEstimator && name != kNoEstimator)
     throw Error(ErrorCode::kUsage,
                 fmt::format("crn: found None; '{}' needs the image with common random numbers", name));
@@ -234,8 +235,9 @@ nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, c
   const Film* light = film_of(beside.light);
   Pair pair(crn, independent, light);
   CombineRequest& request = pair.request;
+  const MethodTarget target = gpu::Target::open(arguments.device);
   request.estimator = estimator_of(pair.crn.has_value(), arguments.estimator, arguments.options,
-                                   denoising_of(arguments.estimator, arguments.denoise, arguments.oidn));
+                                   denoising_of(arguments.estimator, arguments.denoise, arguments.oidn), target);
   const Method& estimator = request.estimator;
   const bool has_counts = !beside.counts.is_none();
   request.settings =
@@ -269,7 +271,9 @@ nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, c
   nb::dict layers;
   for (auto& [name, layer] : combined.layers) layers[name.c_str()] = array_of(std::move(layer));
   d["aovs"] = layers;
-  d["warnings"] = texts_of(combined.inputs.findings);
+  std::vector<std::string> warnings = texts_of(combined.inputs.findings);
+  if (target && target->made_by().empty()) warnings.push_back(combined.image.note);  // why the processor took over
+  d["warnings"] = warnings;
   d["nonfinite_pixels"] = combined.image.nonfinite_pixels;
   d["estimator"] = estimator.text;
   d["samples_per_pixel"] = samples;
@@ -329,19 +333,20 @@ void bind_combine(nb::module_& module) {
       [](nb::object crn, nb::object independent, nb::object counts, nb::object light, nb::object albedo,
          nb::object normal, nb::object denoising_albedo, nb::object denoising_normal, nb::object position,
          nb::dict layers, const std::string& estimator, const OptionValues& options, const std::string& denoise,
-         const std::string& oidn, bool force, std::optional<bool> std_error, std::optional<int> samples,
-         nb::object progress) {
+         const std::string& oidn, const std::string& device, bool force, std::optional<bool> std_error,
+         std::optional<int> samples, nb::object progress) {
         return combine(crn, independent,
                        {counts, light, albedo, normal, denoising_albedo, denoising_normal, position, layers},
-                       {estimator, options, denoise, oidn, force, std_error, samples}, progress);
+                       {estimator, options, denoise, oidn, device, force, std_error, samples}, progress);
       },
       "crn"_a.none(), "independent"_a.none(), "counts"_a.none(), "light"_a.none(), "albedo"_a.none(), "normal"_a.none(),
       "denoising_albedo"_a.none(), "denoising_normal"_a.none(), "position"_a.none(), "layers"_a, "estimator"_a,
-      "options"_a, "denoise"_a, "oidn"_a, "force"_a, "std_error"_a.none(), "samples"_a.none(), "progress"_a.none(),
+      "options"_a, "denoise"_a, "oidn"_a, "device"_a, "force"_a, "std_error"_a.none(), "samples"_a.none(),
+      "progress"_a.none(),
       nb::sig("def combine(crn: object, independent: object, counts: object | None, light: object | None, albedo: "
               "object | None, normal: object | None, denoising_albedo: object | None, denoising_normal: object | None, "
               "position: object | None, layers: dict[str, typing.Any], estimator: str, options: dict[str, str], "
-              "denoise: str, oidn: str, force: "
+              "denoise: str, oidn: str, device: str, force: "
               "bool, std_error: bool | None, samples: int | None, progress: typing.Any) -> dict[str, typing.Any]"));
   module.def(
       "check_pair_estimator", &check_pair_estimator, "estimator"_a, "options"_a, "denoise"_a, "oidn"_a,

@@ -8,6 +8,7 @@
 
 #include "combine/pair_input.h"
 #include "core/number_text.h"
+#include "gpu/target.h"
 
 namespace covary {
 namespace {
@@ -40,6 +41,14 @@ void declare_images(Settings& s, CombineSettings& v) {
 
 }  // namespace
 
+void declare_device(Settings& s, std::string& device) {
+  const auto read = [](const std::string& text, std::string& name) {
+    name = text;
+    return gpu::wrong_device_name(text);
+  };
+  s.text_as("device", device, "DEVICE", read, gpu::kDeviceHelp);
+}
+
 void declare(Settings& s, CombineSettings& v) {
   declare_images(s, v);
   std::vector<std::string> names = pair_estimator_names();
@@ -60,6 +69,7 @@ void declare(Settings& s, CombineSettings& v) {
   s.flag("error", v.error, "Add the standard error as channels StdError.R, .G, .B");
   s.text_as("explain", v.explain, "X,Y", read_pixel, "Print the control variates of this pixel and their coefficients");
   s.flag("force", v.force, "Combine even if the check of the inputs finds errors");
+  declare_device(s, v.device);
   s.real("memory", v.memory_mib, {.low = 0, .above_low = true}, kMemoryHelp);
 }
 

@@ -34,11 +34,15 @@ struct CombineSettings {
   std::string estimator = kDefaultEstimator;
   std::optional<int> samples;  ///< samples per pixel of the CRN image
   DenoisingChoice denoising;
-  bool error = false;  ///< also estimate the standard error
+  std::string device = "cpu";  ///< where it runs, as gpu::Target::open() takes it
+  bool error = false;          ///< also estimate the standard error
   bool force = false;  ///< combine despite errors in the inputs
   std::optional<PixelPosition> explain;
   std::optional<double> memory_mib;  ///< memory limit
 };
 void declare(Settings& settings, CombineSettings& v);
+
+/// Declares `device`.
+void declare_device(Settings& settings, std::string& device);
 
 }  // namespace covary

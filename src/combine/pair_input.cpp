@@ -127,9 +127,9 @@ std::string needs_samples_text(const std::string& name) {
   return "";
 }
 
-Method make_pair_estimator(const std::string& name, const OptionValues& values) {
+Method make_pair_estimator(const std::string& name, const OptionValues& values, const MethodTarget& target) {
   if (const std::string text = needs_samples_text(name); !text.empty()) throw Error(ErrorCode::kUsage, text);
-  Method estimator = make_estimator(name, values);
+  Method estimator = make_estimator(name, values, target);
   if (!estimator.pair())
     throw Error(ErrorCode::kUsage, fmt::format("estimator '{}' is not one of two images; those are {}", name,
                                                fmt::join(pair_estimator_names(), ", ")));

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "combine/input_checks.h"
+#include "combine/registry.h"
 #include "estimators/method.h"
 #include "film/exr.h"
 #include "film/written_by.h"
@@ -60,6 +61,6 @@ MethodSettings pair_settings(const Method& estimator, std::optional<int> samples
 /// Why the estimator cannot be applied to images; empty if it can, or if there is no such estimator.
 std::string needs_samples_text(const std::string& name);
 /// make_estimator() for two-image estimators. Throws Error(kUsage) for any other.
-Method make_pair_estimator(const std::string& name, const OptionValues& values);
+Method make_pair_estimator(const std::string& name, const OptionValues& values, const MethodTarget& target = {});
 
 }  // namespace covary

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <map>
 #include <optional>
 
@@ -13,14 +14,20 @@
 
 namespace covary::device {
 
-RawBuffer::RawBuffer(std::shared_ptr<Backend> backend, size_t bytes) : backend_(std::move(backend)), bytes_(bytes) {
-  // Drivers refuse buffers of no bytes.
-  handle_ = backend_->allocate(std::max<size_t>(bytes, 1));
+namespace {
+
+/// Drivers refuse buffers of no bytes.
+size_t at_least_one(size_t bytes) { return std::max<size_t>(bytes, 1); }
+
+}  // namespace
+
+RawBuffer::RawBuffer(std::shared_ptr<MemoryPool> pool, size_t bytes) : pool_(std::move(pool)), bytes_(bytes) {
+  handle_ = pool_->take(at_least_one(bytes));
 }
 
 void RawBuffer::reset() noexcept {
-  if (handle_) backend_->release(handle_);
-  backend_.reset();
+  if (handle_) pool_->give(handle_, at_least_one(bytes_));
+  pool_.reset();
   handle_ = 0;
   bytes_ = 0;
 }
@@ -60,10 +67,13 @@ struct Device::Programs {
 };
 
 Device::Device(std::shared_ptr<Backend> backend)
-    : backend_(std::move(backend)), programs_(std::make_unique<Programs>(*backend_)) {}
+    : backend_(std::move(backend)),
+      pool_(std::make_shared<MemoryPool>(backend_)),
+      programs_(std::make_unique<Programs>(*backend_)) {}
 Device::Device(Device&&) noexcept = default;
 Device& Device::operator=(Device&& other) noexcept {
   std::swap(backend_, other.backend_);
+  std::swap(pool_, other.pool_);
   std::swap(programs_, other.programs_);
   return *this;
 }

@@ -23,14 +23,16 @@
 
 #include "device/backend.h"
 #include "device/device_info.h"
+#include "device/memory_pool.h"
 
 namespace covary::device {
 
-/// Memory of a device, freed with the object, which keeps the device open.
+/// Memory of a device, given back with the object, which keeps the device open. Later buffers of the same size may have
+/// it (memory_pool.h), so its content is undefined at first.
 class RawBuffer {
  public:
   RawBuffer() = default;
-  RawBuffer(std::shared_ptr<Backend> backend, size_t bytes);
+  RawBuffer(std::shared_ptr<MemoryPool> pool, size_t bytes);
   ~RawBuffer() { reset(); }
   RawBuffer(RawBuffer&& other) noexcept { swap(other); }
   RawBuffer& operator=(RawBuffer&& other) noexcept {
@@ -44,11 +46,11 @@ class RawBuffer {
 
  private:
   void swap(RawBuffer& other) noexcept {
-    std::swap(backend_, other.backend_);
+    std::swap(pool_, other.pool_);
     std::swap(handle_, other.handle_);
     std::swap(bytes_, other.bytes_);
   }
-  std::shared_ptr<Backend> backend_;
+  std::shared_ptr<MemoryPool> pool_;
   uint64_t handle_ = 0;
   size_t bytes_ = 0;
 };
@@ -58,7 +60,7 @@ template <typename T>
 class Buffer : public RawBuffer {
  public:
   Buffer() = default;
-  Buffer(std::shared_ptr<Backend> backend, size_t size) : RawBuffer(std::move(backend), size * sizeof(T)) {}
+  Buffer(std::shared_ptr<MemoryPool> pool, size_t size) : RawBuffer(std::move(pool), size * sizeof(T)) {}
   size_t size() const { return bytes() / sizeof(T); }
 };
 
@@ -109,7 +111,7 @@ class Device {
 
   template <typename T>
   Buffer<T> make(size_t size) {
-    return Buffer<T>(backend_, size);
+    return Buffer<T>(pool_, size);
   }
   /// Copies to and from a buffer, from element `first` of it on. The source may be changed after write() has returned.
   template <typename T>
@@ -156,6 +158,7 @@ class Device {
   void launch_with(const Kernel& kernel, Range global, Range group, std::span<const Argument> arguments);
 
   std::shared_ptr<Backend> backend_;
+  std::shared_ptr<MemoryPool> pool_;
   std::unique_ptr<Programs> programs_;
 };
 

@@ -88,6 +88,20 @@ TEST(Device, WritesAndReadsParts) {
   EXPECT_TRUE(device.make<float>(0));
 }
 
+TEST(Device, UsesMemoryAgain) {
+  Device device = Device::open("opencl");
+  uint64_t handle;
+  {
+    const Buffer<float> first = device.make<float>(1000), other = device.make<float>(1000);
+    EXPECT_NE(first.handle(), other.handle());
+    handle = other.handle();
+  }
+  const Buffer<float> larger = device.make<float>(1001);
+  EXPECT_NE(larger.handle(), handle);
+  const Buffer<float> again = device.make<float>(1000), once_more = device.make<float>(1000);
+  EXPECT_TRUE(again.handle() == handle || once_more.handle() == handle);
+}
+
 TEST(Device, BuffersOutliveTheDevice) {
   Buffer<float> buffer;
   {

@@ -9,6 +9,7 @@
 #include "core/parallel.h"
 #include "estimators/control_variates.h"
 #include "estimators/method.h"
+#include "estimators/pair_steps.h"
 #include "filters/planes.h"
 
 namespace covary {
@@ -144,8 +145,7 @@ class Iduw {
 
 }  // namespace
 
-EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& independent, const IduwOptions& options,
-                     float* chosen_gamma) {
+void check_iduw(const GroupedImage& crn, const GroupedImage& independent, const IduwOptions& options) {
   COVARY_CHECK(kWindowRange.contains(options.window) && !options.gammas.empty() &&
                    std::ranges::all_of(options.gammas, [](float gamma) { return gamma > 0; }),
                "options of iduw are in the ranges that iduw.h states");
@@ -154,7 +154,11 @@ EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& independent, c
     problems.push_back(fmt::format("samples is {}, expected the samples per pixel of the CRN image", options.samples));
   check_inputs(crn, independent, 4, 4, problems);
   throw_if_any(kIduw, problems);
+}
 
+EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& independent, const IduwOptions& options,
+                     float* chosen_gamma) {
+  check_iduw(crn, independent, options);
   EstimatorResult result;
   const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
   const Iduw method(crn, independent, valid, options);
@@ -170,10 +174,14 @@ EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& independent, c
   return result;
 }
 
-Method make_iduw(Settings& parameters) {
+IduwOptions declare_iduw(Settings& settings) {
   IduwOptions o;
-  parameters.whole("window", o.window, kWindowRange, kWindowHelp);
+  settings.whole("window", o.window, kWindowRange, kWindowHelp);
+  return o;
+}
 
+Method make_iduw(Settings& parameters) {
+  const IduwOptions o = declare_iduw(parameters);
   PassPair pair;
   pair.needs_sample_count = true;
   pair.image = [o](const GroupedImage& crn, const GroupedImage& independent, const MethodSettings& settings) {

@@ -6,7 +6,7 @@
 
 #include "core/error.h"
 #include "estimators/control_variates.h"
-#include "estimators/iicv_steps.h"
+#include "estimators/pair_steps.h"
 #include "estimators/method.h"
 #include "estimators/missing_light.h"
 #include "estimators/pilot.h"

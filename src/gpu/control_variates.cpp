@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <bit>
 
-#include "estimators/iicv_steps.h"
 #include "estimators/missing_light.h"
+#include "estimators/pair_steps.h"
 #include "filters/relative_counts.h"
 #include "gpu/bands.h"
 #include "gpu/launch.h"

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gpu/pair_methods.h"
 
-#include "estimators/iicv_steps.h"
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "estimators/pair_steps.h"
 #include "gpu/control_variates.h"
 #include "gpu/dependent_filters.h"
+#include "gpu/iduw.h"
 
 namespace covary::gpu {
 namespace {
@@ -20,6 +24,7 @@ ImageOfPair on_target(const std::shared_ptr<Target>& target, const ImageOfPair& 
         [&](Device& device) -> MethodImage {
           Options own = options;
           if constexpr (requires { own.std_error; }) own.std_error = settings.std_error;
+          if constexpr (requires { own.samples; }) own.samples = static_cast<int>(settings.crn_samples);
           return work(device, crn, independent, own);
         },
         [&] { return image(crn, independent, settings); });
@@ -28,7 +33,7 @@ ImageOfPair on_target(const std::shared_ptr<Target>& target, const ImageOfPair& 
 
 }  // namespace
 
-std::vector<std::string> device_methods() { return {kIicv, kCvBaseline, kDependentTests}; }
+std::vector<std::string> device_methods() { return {kIicv, kCvBaseline, kIduw, kDependentTests}; }
 
 void put_on(const std::shared_ptr<Target>& target, const OptionValues& options, Method& method) {
   Settings values(options);
@@ -41,6 +46,11 @@ void put_on(const std::shared_ptr<Target>& target, const OptionValues& options, 
   else if (method.name == kDependentTests)
     pair->image = on_target(target, pair->image, declare_dependent_tests(values).filter,
                             [](auto&&... a) { return dependent_tests(a...); });
+  else if (method.name == kIduw)
+    pair->image = on_target(target, pair->image, declare_iduw(values), [](auto&&... a) { return iduw(a...); });
+  else if (!method.one_pass() && !target->is_automatic())
+    throw Error(ErrorCode::kUsage, fmt::format("`device` {}: devices know the estimators {}; {} runs on the processor",
+                                               target->info().id(), fmt::join(device_methods(), ", "), method.name));
 }
 
 }  // namespace covary::gpu

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace covary::gpu {
 
@@ -21,8 +22,14 @@ std::string wrong_device_name(const std::string& name) {
 
 std::shared_ptr<Target> Target::open(const std::string& name) {
   if (name == kProcessor) return nullptr;
+  static std::mutex mutex;
+  static std::map<std::string, std::weak_ptr<Target>> opened;
+  const std::lock_guard lock(mutex);
+  if (std::shared_ptr<Target> known = opened[name].lock()) return known;
   try {
-    return std::make_shared<Target>(device::Device::open(name), name == kAutomatic);
+    auto target = std::make_shared<Target>(device::Device::open(name), name == kAutomatic);
+    opened[name] = target;
+    return target;
   } catch (const device::Failure& failure) {
     if (name == kAutomatic) return nullptr;
     throw Error(failure.code(), fmt::format("`device` {}: {}", name, failure.what()));

@@ -26,7 +26,8 @@ std::string wrong_device_name(const std::string& name);
 /// A device that images are made on, opened. Thread-safe; one piece of work at a time.
 class Target {
  public:
-  /// Null for "cpu", and for "auto" without a GPU. Throws Error(kUsage) for other names without a device.
+  /// Null for "cpu", and for "auto" without a GPU. Throws Error(kUsage) for other names without a device. The same one
+  /// for the same name, as long as anybody uses it.
   static std::shared_ptr<Target> open(const std::string& name);
   /// For tests. `is_automatic`: the processor takes over when the device fails.
   Target(device::Device device, bool is_automatic) : device_(std::move(device)), is_automatic_(is_automatic) {}
@@ -53,6 +54,8 @@ class Target {
     return result;
   }
 
+  /// Whether the processor takes over what the device cannot do.
+  bool is_automatic() const { return is_automatic_; }
   const device::DeviceInfo& info() const { return device_.info(); }
   /// "cuda:0 (NVIDIA H100)" if images were made there; empty otherwise.
   std::string made_by() const { return used_ && !failed_ ? info().text() : ""; }

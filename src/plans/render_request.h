@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -64,6 +65,8 @@ struct RenderRequest {
   std::map<std::string, Image> beside;
   /// Attributes of films and image from the caller, such as film_key::kVersion and kCommand.
   std::map<std::string, std::string> attributes;
+  /// Names the device that has made the image, "" if it was the processor; empty: the processor.
+  std::function<std::string()> made_by;
 };
 
 inline constexpr double kMostSamples = 1 << 30;

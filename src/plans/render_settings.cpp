@@ -6,8 +6,10 @@
 
 #include <algorithm>
 
+#include "combine/combine_settings.h"
 #include "core/error.h"
 #include "core/number_text.h"
+#include "gpu/target.h"
 #include "integrators/registry.h"
 #include "passes/light_pass.h"
 #include "passes/training.h"
@@ -98,6 +100,7 @@ void declare(Settings& s, RenderSettings& v) {
            kBasicPasses);
   v.denoising.mode = usual_denoising(v.estimator);
   declare(s, v.denoising, false);
+  declare_device(s, v.device);
   s.group("Rendering");
   s.text_as("resolution", v, "WIDTHxHEIGHT", read_resolution, "Size of the full frame; default: the scene's",
             kBasicSamples);
@@ -107,7 +110,9 @@ void declare(Settings& s, RenderSettings& v) {
 }
 
 Method estimator_of(const RenderSettings& settings, const OptionValues& of_estimator) {
-  Method estimator = with_denoising(make_estimator(settings.estimator, of_estimator), settings.denoising);
+  const MethodTarget target = gpu::Target::open(settings.device);
+  Method estimator =
+      with_denoising(make_estimator(settings.estimator, of_estimator, target), settings.denoising, target);
   if (!settings.request.relative_error) return estimator;
   if (!estimator.adaptive)
     throw Error(ErrorCode::kUsage,
@@ -159,6 +164,8 @@ RenderRequest request_of(const RenderSettings& settings, const LoadedScene& scen
     throw Error(ErrorCode::kUsage,
                 fmt::format("`oidn` has no effect {}, and no training with `cv-variance` relative-oidn", kNotDenoised));
   if (is_surrogate) request.oidn = oidn;
+  if (const MethodTarget target = gpu::Target::open(settings.device))
+    request.made_by = [target] { return target->made_by(); };
   return request;
 }
 

@@ -23,6 +23,7 @@ struct RenderSettings {
   PassChoice passes;
   std::string estimator = kDefaultEstimator;
   DenoisingChoice denoising;
+  std::string device = "cpu";  ///< where images are estimated, as gpu::Target::open() takes it
 };
 /// An estimator or kind of sampling that is named explicitly is used as it is, without denoising unless requested.
 void declare(Settings& settings, RenderSettings& render);

@@ -49,6 +49,8 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
     const bool estimated = !result.image.estimate.data.empty();
     attributes["covary:estimator"] = estimated ? plan.method->text : kMeanName;
     if (estimated && !plan.method->network.empty()) attributes["covary:denoiser"] = plan.method->network;
+    if (const std::string device = estimated && request.made_by ? request.made_by() : ""; !device.empty())
+      attributes["covary:device"] = device;
     if (result.interrupted) attributes[std::string("covary:") + film_key::kComplete] = "false";
     attributes["covary:samples"] = fmt::format("{:g}", result.samples_per_pixel());
     if (aovs.contains("Albedo")) attributes[std::string("covary:") + film_key::kCleanGuides] = "true";

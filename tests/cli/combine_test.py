@@ -86,6 +86,36 @@ class Combine(CliTest):
         self.assertIn("covary:estimator: iicv", info)
         self.assertIn("covary:samples: 192", info)
 
+    def test_device(self):
+        """OpenCL on the processor, as scripts/setup installs it, stands for any device."""
+        inputs = ["combine", "--crn", "crn.exr", "--independent", "independent.exr", "--quiet", "--error"]
+        devices = json.loads(self.good("info", "--devices", "--json").stdout)["devices"]
+        opencl = next(d for d in devices if d["id"] == "opencl:0")
+        self.assertIn("opencl:0: " + opencl["name"], self.good("info", "--devices").stdout)
+        name = f"opencl:0 ({opencl['name']})"
+        for words in (IICV, ["--paper"], ["--estimator", "cv-baseline", "--set", "ridge=0.1"],
+                      ["--estimator", "iduw", "--samples", "96"]):
+            error = [] if "iduw" in words else ["--error"]
+            self.good(*inputs[:-1], *error, *words, "-o", "cpu.exr")
+            result = self.good(*inputs[:-1], *error, *words, "-o", "device.exr", "--device", "opencl:0", "--json",
+                               "-")
+            self.assertEqual(json.loads(result.stdout)["device"], name)
+            self.assertIn("covary:device: " + name, self.good("info", "device.exr").stdout)
+            self.assertNotIn("covary:device", self.good("info", "cpu.exr").stdout)
+            expected, found = self.read("cpu.exr"), self.read("device.exr")
+            self.assertEqual(set(found), set(expected))
+            for channel, values in expected.items():
+                close = [abs(a - b) <= 1e-4 * (abs(a) + 0.01) for a, b in zip(values, found[channel])]
+                self.assertGreaterEqual(mean(close), 0.998, (words, channel))
+        output = ["-o", "out.exr", "--device"]
+        self.bad(2, "--device: 'gpu': expected cpu, auto, cuda, opencl, or one of these devices, e.g. opencl:1",
+                 *inputs, *output, "gpu")
+        self.bad(2, "--device opencl:99: there is no device 'opencl:99'; found: ", *inputs, *output, "opencl:99")
+        self.bad(2, "--device opencl:0: devices know the estimators iicv, cv-baseline, iduw, dependent-tests; "
+                 "polynomials runs on the processor", "render", ROOM, "--spp", "64", "--estimator", "polynomials",
+                 *output, "opencl:0")
+        self.bad(2, "--devices tells of this machine; it takes no file", "info", "cpu.exr", "--devices")
+
     def test_explain(self):
         inputs = ["combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "out.exr", "--quiet",
                   "--paper"]

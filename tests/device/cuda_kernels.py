@@ -95,7 +95,8 @@ def main():
                 for kernel, registers, spilled, local in figures(log):
                     rows.setdefault((name, number + 1, kernel), {})[architecture] = (registers, spilled, local)
                     failed |= spilled > 0
-    print("| kernel | set | " + " | ".join(f"{a}: registers, spilled bytes" for a in architectures) + " | local memory |")
+    heads = " | ".join(f"{a}: registers, spilled bytes" for a in architectures)
+    print(f"| kernel | set | {heads} | local memory |")
     print("|---|---|" + "---|" * (len(architectures) + 1))
     for (name, number, kernel), found in rows.items():
         cells = [f"{found[a][0]}, {found[a][1]}" if a in found else "–" for a in architectures]

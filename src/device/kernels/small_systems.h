@@ -132,7 +132,10 @@ FUNCTION float inverse_trace(LOCAL float* A, int pitch, LOCAL const float* inver
       const float e0 = i0 == j ? inverse[i0] : -s.x * inverse[i0];
       float e1 = 0.0f, e2 = 0.0f, e3 = 0.0f;
       const float before = i0 < j ? 0.0f : e0;
-      if (i0 + 1 < m) e1 = i0 + 1 == j ? inverse[i0 + 1] : i0 + 1 < j ? 0.0f : -fma(D[1], before, s.y) * inverse[i0 + 1];
+      if (i0 + 1 < m)
+        e1 = i0 + 1 == j  ? inverse[i0 + 1]
+             : i0 + 1 < j ? 0.0f
+                          : -fma(D[1], before, s.y) * inverse[i0 + 1];
       if (i0 + 2 < m)
         e2 = i0 + 2 == j  ? inverse[i0 + 2]
              : i0 + 2 < j ? 0.0f

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// What iicv() and cv_baseline() do, for whatever carries it out: their checks, and the settings of the estimator that
-// they share (control_variates.h).
+// What iicv(), cv_baseline() and iduw() do, for whatever carries it out: their checks, and the settings of the
+// estimator that the first two share (control_variates.h).
 #pragma once
 
 #include "estimators/control_variates.h"
 #include "estimators/cv_baseline.h"
+#include "estimators/iduw.h"
 #include "estimators/iicv.h"
 
 namespace covary {
@@ -26,8 +27,13 @@ struct VariateSteps {
 VariateSteps steps_of(const GroupedImage& crn, const GroupedImage& independent, const IicvOptions& options);
 VariateSteps steps_of(const GroupedImage& crn, const GroupedImage& independent, const CvBaselineOptions& options);
 
-/// The options of make_iicv() and make_cv_baseline(), declared to `settings`. Throw Error(kUsage) likewise.
+/// Throws likewise.
+void check_iduw(const GroupedImage& crn, const GroupedImage& independent, const IduwOptions& options);
+
+/// The options of make_iicv(), make_cv_baseline() and make_iduw(), declared to `settings`. Throw Error(kUsage)
+/// likewise.
 IicvOptions declare_iicv(Settings& settings);
 CvBaselineOptions declare_cv_baseline(Settings& settings);
+IduwOptions declare_iduw(Settings& settings);
 
 }  // namespace covary
