@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Compiles all kernels as CUDA by NVRTC, without a GPU, and prints registers and spilled bytes of each as a table.
+"""Compiles all kernels as CUDA by NVRTC, without a GPU, and prints registers and spilled bytes of each as a table,
+and the local memory of a work group.
 
 A kernel file says with which definitions it is compiled, one line "// Compiled: NAME=value …" for each set. NVRTC is
 named by COVARY_NVRTC (a file), or found by the loader, or as the package nvidia-cuda-nvrtc-cu12 of this Python.
@@ -95,8 +96,7 @@ def main():
                 for kernel, registers, spilled, local in figures(log):
                     rows.setdefault((name, number + 1, kernel), {})[architecture] = (registers, spilled, local)
                     failed |= spilled > 0
-    heads = " | ".join(f"{a}: registers, spilled bytes" for a in architectures)
-    print(f"| kernel | set | {heads} | local memory |")
+    print(f"| kernel | set | {' | '.join(architectures)} | local memory |")
     print("|---|---|" + "---|" * (len(architectures) + 1))
     for (name, number, kernel), found in rows.items():
         cells = [f"{found[a][0]}, {found[a][1]}" if a in found else "–" for a in architectures]
