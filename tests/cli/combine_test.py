@@ -108,7 +108,7 @@ class Combine(CliTest):
                 close = [abs(a - b) <= 1e-4 * (abs(a) + 0.01) for a, b in zip(values, found[channel])]
                 self.assertGreaterEqual(mean(close), 0.998, (words, channel))
         output = ["-o", "out.exr", "--device"]
-        self.bad(2, "--device: 'gpu': expected cpu, auto, cuda, opencl, or one of these devices, e.g. opencl:1",
+        self.bad(2, "--device 'gpu': expected cpu, auto, cuda, opencl, or one of these devices, e.g. opencl:1",
                  *inputs, *output, "gpu")
         self.bad(2, "--device opencl:99: there is no device 'opencl:99'; found: ", *inputs, *output, "opencl:99")
         self.bad(2, "--device opencl:0: devices know the estimators iicv, cv-baseline, iduw, dependent-tests; "
