@@ -15,8 +15,12 @@
 
 #include "core/random.h"
 #include "core/stopwatch.h"
+#include "denoising/candidates.h"
+#include "denoising/denoising_parts.h"
+#include "denoising/mixed_denoising.h"
 #include "gpu/control_variates.h"
 #include "gpu/iduw.h"
+#include "gpu/mixed_denoising.h"
 
 namespace covary {
 namespace {
@@ -28,9 +32,10 @@ constexpr int kGroups = 12;
 struct Images {
   int width, height;
   std::vector<float> crn, independent;
+  Image albedo, normal;
   GroupedImage view(const std::vector<float>& data) const { return {width, height, kGroups, data.data()}; }
 
-  Images(int w, int h) : width(w), height(h) {
+  Images(int w, int h) : width(w), height(h), albedo(w, h, 3), normal(w, h, 3) {
     const size_t n = static_cast<size_t>(w) * h * kGroups * 3;
     crn.resize(n), independent.resize(n);
     uint64_t state = 1;
@@ -45,6 +50,10 @@ struct Images {
       const auto x = static_cast<float>(pixel % w) / static_cast<float>(w),
                  y = static_cast<float>(pixel / w) / static_cast<float>(h);
       const float expected = (x + y > 1 ? 0.3f : 1.0f) * (1.5f + std::sin(9 * x) * std::cos(7 * y));
+      if (element < 3) {
+        albedo.data[3 * pixel + element] = 0.3f + 0.5f * static_cast<float>((pixel % w / 16 + pixel / w / 16) % 2);
+        normal.data[3 * pixel + element] = x + y > 1 ? 0.5f : -0.5f;
+      }
       crn[i] = expected * (1 + 0.8f * common[element] + 0.2f * noise());
       independent[i] = expected * (1 + noise());
     }
@@ -66,6 +75,16 @@ Measured measured(const std::string& name, const Options& options, OnDevice on_d
           }};
 }
 
+/// The default without a network.
+EstimatorResult denoised(device::Device* device, const Images& in, const gpu::Trial& trial) {
+  const GroupedImage independent = in.view(in.independent);
+  const Guides guides{&in.albedo, &in.normal};
+  const FilterKinds kinds = kinds_for(kGroups, false);
+  if (device) return gpu::mix_mean(*device, {independent, guides, kinds, {1, 1, false}, {}, true, false}, trial).result;
+  const std::vector<CandidateMaker> makers = {filtered_candidates(guides, CandidateBase::kMean, kinds)};
+  return denoise_by_mixture(parts_of_mean(independent), makers, DenoiseMode::kAuto, true).result;
+}
+
 std::vector<Measured> methods() {
   const auto iicv_there = [](auto&&... a) { return gpu::iicv(a...); };
   const auto iicv_here = [](auto&&... a) { return iicv(a...); };
@@ -85,7 +104,8 @@ std::vector<Measured> methods() {
               [](auto& device, auto& crn, auto& independent, auto& options, auto& trial) {
                 return gpu::iduw(device, crn, independent, options, nullptr, trial);
               },
-              [](auto&... a) { return iduw(a...); })};
+              [](auto&... a) { return iduw(a...); }),
+          {"mixture --oidn off, with its error", denoised}};
 }
 
 /// The fraction of values within 1e-4 of the processor's |value| + 0.01.
