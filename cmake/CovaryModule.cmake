@@ -40,6 +40,7 @@ function(covary_test program)
   endif()
   target_include_directories(${program} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/tests)
   target_link_libraries(${program} PRIVATE ${TEST_DEPENDS} GTest::gtest_main)
+  covary_test_options(${program})
   covary_precompile(${program})
   # Only files that name it know where the source tree lies: the others compile to the same object in every checkout, so
   # a compiler cache serves them all.
