@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <iterator>
 #include <memory>
 #include <numeric>
@@ -211,8 +212,10 @@ bool convert_to_png_by_rows(const ConvertOptions& options) {
   return true;
 }
 
+bool names_frames(const std::string& path) { return is_frame_pattern(path) && !std::filesystem::exists(path); }
+
 /// Converts numbered images, or several sequences side by side, to a video.
-void convert_frames(const ConvertOptions& options) {
+void convert_to_video(const ConvertOptions& options) {
   constexpr double kUsualRate = 24;
   const std::vector<std::string> inputs(options.files.begin(), options.files.end() - 1);
   const std::string& output = options.files.back();
@@ -242,9 +245,35 @@ void convert_frames(const ConvertOptions& options) {
   video.finish();
 }
 
+void convert(const ConvertOptions& options);
+
+/// Converts numbered images to numbered images; a file without a number is the same for all.
+void convert_frames(const ConvertOptions& options) {
+  const auto pattern = std::find_if(options.files.begin(), options.files.end() - 1, names_frames);
+  if (pattern == options.files.end() - 1)
+    throw Error(ErrorCode::kUsage, fmt::format("the output '{}' has a '#' for the number of a frame, but no input has",
+                                               options.files.back()));
+  const std::vector<int> frames = frames_on_disk(*pattern);
+  if (frames.empty()) throw Error(ErrorCode::kInput, fmt::format("there are no frames '{}'", *pattern));
+  std::vector<ConvertOptions> of_frames;
+  for (const int frame : frames) {
+    ConvertOptions& one = of_frames.emplace_back(options);
+    for (std::string& file : one.files)
+      if (names_frames(file)) file = frame_name(file, frame);
+    for (size_t i = 0; i + 1 < one.files.size(); ++i) inspect_image(one.files[i], options.checksums());
+  }
+  for (const ConvertOptions& one : of_frames) convert(one);
+}
+
 void convert(const ConvertOptions& options) {
   if (options.files.size() < 2) throw Error(ErrorCode::kUsage, "convert needs an image to read and one to write");
-  if (is_video_name(options.files.back())) return convert_frames(options);
+  if (is_video_name(options.files.back())) return convert_to_video(options);
+  if (names_frames(options.files.back())) return convert_frames(options);
+  if (const auto frames = std::find_if(options.files.begin(), options.files.end(), names_frames);
+      frames != options.files.end())
+    throw Error(ErrorCode::kUsage, fmt::format("'{}' are frames: expected an output with a '#', too, or a video "
+                                               "(.mp4, .mkv, .mov, .webm)",
+                                               *frames));
   if (options.rate) throw Error(ErrorCode::kUsage, "--fps is an option of videos (.mp4, .mkv, .mov, .webm)");
   const std::vector<std::string> inputs(options.files.begin(), options.files.end() - 1);
   const std::string& output = options.files.back();
@@ -270,8 +299,8 @@ void add_convert(CLI::App& app) {
       app.add_subcommand("convert", "Convert images, or layers of films, to EXR, PNG, HDR, PFM, JPEG or TIFF");
   add_value(*command, "FILES", o->files, kFileValue,
             "Images (EXR, HDR, PFM, …), put side by side, and last the output, whose name sets the format (.exr "
-            ".pfm .tif: 32-bit linear, .hdr: linear, .png .jpg: 8-bit sRGB; .mp4 .mkv .mov "
-            ".webm: a video of in_####.exr, by ffmpeg)")
+            ".pfm .tif: 32-bit linear, .hdr: linear, .png .jpg: 8-bit sRGB; out_####.png: of "
+            "frames in_####.exr; .mp4 .mkv .mov .webm: a video of them, by ffmpeg)")
       ->option_text("IN... OUT")
       ->required();
   command->add_option("-e,--exposure", o->exposure, "Stops: the image is multiplied by 2^E")

@@ -97,6 +97,27 @@ class Video(CliTest):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn(b"-video_size 8x3 -framerate 24", (self.path / "v.mp4").read_bytes())
 
+    def test_frames_go_to_frames(self):
+        """Each as alone; a file without a number stands beside all."""
+        self.image("logo.exr", [5] * 3)
+        for arguments, alone in ((("f_##.exr", "p_####.png"), ("f_10.exr", "alone.png")),
+                                 (("f_##.exr", "logo.exr", "q_####.png"), ("f_10.exr", "logo.exr", "alone.png"))):
+            for words in (arguments, alone):
+                result = self.convert(*words, "--exposure", "-5", "--overwrite")
+                self.assertEqual((result.returncode, result.stderr), (0, ""))
+            pattern = arguments[-1]
+            self.assertEqual(sorted(p.name for p in self.path.glob(pattern.replace("####", "*"))),
+                             [pattern.replace("####", f"{n:04}") for n in (1, 2, 10)])
+            self.assertEqual((self.path / pattern.replace("####", "0010")).read_bytes(),
+                             (self.path / "alone.png").read_bytes())
+        for arguments, code, message in (
+                (("f_##.exr", "one.png"), 2, "'f_##.exr' are frames: expected an output with a '#', too, or a video"),
+                (("logo.exr", "p_##.png"), 2, "the output 'p_##.png' has a '#' for the number of a frame, but no "),
+                (("g_##.exr", "p_##.png"), 1, "there are no frames 'g_##.exr'")):
+            result = self.convert(*arguments)
+            self.assertEqual(result.returncode, code, result.stderr)
+            self.assertIn(message, result.stderr)
+
     def test_failures_leave_no_file(self):
         (self.path / "fail").touch()
         self.assertIn("ffmpeg could not write 'v.mp4'", self.convert("f_##.exr", "v.mp4").stderr)
