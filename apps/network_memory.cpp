@@ -3,10 +3,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "core/error.h"
 #include "core/memory_limit.h"
+#include "denoising/network_memory.h"
 
 namespace covary {
 
@@ -14,10 +13,9 @@ namespace covary {
 /// result) and, in tiles of limited size, its own values.
 void require_memory_of_network(const std::string& input, const CropWindow& window,
                                std::optional<double> permitted_mib) {
-  constexpr double kImageBytes = 7 * 3 * sizeof(float), kBytesOfTile = 600, kLargestTile = 2160.0 * 2160;
-  constexpr double kMebibyte = 1 << 20;
+  constexpr double kImageBytes = 7 * 3 * sizeof(float), kMebibyte = 1 << 20;
   const double n_pixels = static_cast<double>(window.width) * window.height;
-  const double bytes = n_pixels * kImageBytes + std::min(n_pixels, kLargestTile) * kBytesOfTile;
+  const double bytes = n_pixels * kImageBytes + network_library_memory() + network_tile_memory(n_pixels);
   if (permitted_mib && bytes > *permitted_mib * kMebibyte)
     throw Error(
         ErrorCode::kUsage,

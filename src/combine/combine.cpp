@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/memory_limit.h"
 #include "core/stopwatch.h"
+#include "denoising/network_memory.h"
 #include "estimators/mean.h"
 #include "estimators/result_rows.h"
 #include "filters/planes.h"
@@ -55,12 +56,13 @@ std::string inputs_text(const CombineRequest& request) {
 
 void check_memory(const CombineRequest& request, double planned) {
   if (planned <= std::max(kLeastMemoryLimit, request.most_memory.value_or(memory_limit()))) return;
-  throw Error(ErrorCode::kUsage,
-              fmt::format("{} x {} pixels of {} need {} of memory for {}{}; {}", request.independent.width,
-                          request.independent.height, inputs_text(request), bytes_text(planned), request.estimator.text,
-                          needs_whole(request) ? ", which works on whole images" : "",
-                          request.most_memory ? bytes_text(*request.most_memory) + " are allowed (`memory`)"
-                                              : memory_limit_text()));
+  throw Error(
+      ErrorCode::kUsage,
+      fmt::format(
+          "{} x {} pixels of {} need {}{} of memory for {}{}; {}", request.independent.width,
+          request.independent.height, inputs_text(request), needs_whole(request) ? "" : "at least ",
+          bytes_text(planned), request.estimator.text, needs_whole(request) ? ", which works on whole images" : "",
+          request.most_memory ? bytes_text(*request.most_memory) + " are allowed (`memory`)" : memory_limit_text()));
 }
 
 /// The light film's error is its variance alone and is added to every image. `before`: the error predicted without it.
@@ -132,7 +134,8 @@ double memory_of_rows(const CombineRequest& request, int rows) {
   const bool in_bands = rows < request.independent.height;
   // For bands: the estimate of the whole image; its standard error and bias are stored beside them.
   const double of_whole = n_guides * kImage + (in_bands ? 3 * kImage + request.estimator.memory.of_whole : 0);
-  const double results = of_whole * width * request.independent.height;
+  const double library = request.estimator.network.empty() ? 0 : network_library_memory();
+  const double results = of_whole * width * request.independent.height + library;
   const double layers = request.layers.empty() ? 0 : static_cast<double>(request.layers.size() + 1);
   return n_pixels * (values + layers * layer_bytes(request.independent.groups) + (in_bands ? n_guides * kImage : 0)) +
          request.estimator.memory.bytes(n_pixels, groups) + results;
@@ -163,7 +166,12 @@ int rows_in_memory(const CombineRequest& request) {
 double planned_memory(const CombineRequest& request) {
   const int height = request.independent.height, reach = request.estimator.reach;
   const int fewest = needs_whole(request) ? height : std::min(height, kFewestRows + kRegressionCell + 2 * reach);
-  return memory_of_rows(request, std::max(fewest, rows_in_memory(request)));
+  const int rows = std::max(fewest, rows_in_memory(request));
+  const double of_rows = memory_of_rows(request, rows);
+  if (request.estimator.network.empty() || rows >= height) return of_rows;
+  // The network denoises the whole image before there are bands.
+  const double n_pixels = static_cast<double>(request.independent.width) * height;
+  return std::max(of_rows, memory_of_rows(request, 0) + network_tile_memory(n_pixels));
 }
 
 void limit_memory(CombineRequest& request, std::optional<double> mebibytes) {

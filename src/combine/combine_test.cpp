@@ -10,6 +10,7 @@
 #include "combine/registry.h"
 #include "core/error.h"
 #include "denoising/mixed_denoising.h"
+#include "denoising/network_memory.h"
 #include "estimators/mean.h"
 #include "estimators/test_images.h"
 #include "risk/error_interval.h"
@@ -77,6 +78,26 @@ TEST(Combine, BandsHaveTheBitsOfTheWhole) {
   EXPECT_EQ(bands.image.std_error.data, whole.image.std_error.data);
   EXPECT_EQ(whole.image.nonfinite_pixels, 1);
   EXPECT_EQ(bands.image.nonfinite_pixels, 1);
+}
+
+TEST(Combine, PlansWhatTheNetworkTakesBeforeThereAreBands) {
+  const Images images;
+  CombineRequest request = images.request();
+  request.crn.reset();
+  MixedDenoisingOptions options;
+  options.use_oidn = false;
+  request.estimator = with_denoising(make_estimator("none"), options);
+  request.independent.width = 400, request.independent.height = 1000;
+  limit_memory(request, 150);
+  const double without = planned_memory(request);
+  EXPECT_LT(without, 200e6);
+  request.estimator.network = "Open Image Denoise";
+  EXPECT_GT(planned_memory(request), network_library_memory() + network_tile_memory(400.0 * 1000));
+  EXPECT_TRUE(contains(message_of([&] { combine(request); }, ErrorCode::kUsage), "need at least 297.6 MB"));
+  EXPECT_TRUE(contains(message_of([&] { combine(request); }, ErrorCode::kUsage), "157.3 MB are allowed"));
+  request.most_memory.reset();
+  request.memory = 320e6;  // with room for the library
+  EXPECT_LE(planned_memory(request), 320e6);
 }
 
 TEST(Combine, LightIsAddedAfterCalibration) {
