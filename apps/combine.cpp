@@ -280,7 +280,7 @@ void combine_files(const CombineOptions& o) {
   CombineRequest& request = inputs.request;
   request.checked = [&](const InputFindings& found) {
     progress.clear();
-    print_findings(found.findings, o.force, o.quiet);
+    print_findings(found.findings, "combines", o.force, o.quiet);
     progress.begin(o.denoising.denoises() ? "estimating and denoising" : "estimating");
   };
   CombinedImage combined = combine(request);

@@ -211,7 +211,7 @@ Denoised denoise_by_mixture(const Options& o, const Task& task, const GroupedFil
   limit_memory(request, o.memory_mib);
   request.checked = [&](const InputFindings& found) {
     progress.clear();
-    print_findings(found.findings, o.force, o.quiet);
+    print_findings(found.findings, "denoises", o.force, o.quiet);
     progress.begin("denoising");
   };
   auto combined = std::make_shared<CombinedImage>(combine(request));

@@ -47,9 +47,9 @@ void add_prediction(const PredictedError& predicted, nlohmann::ordered_json& jso
   if (!doubt.empty()) json["predicted_relmse_doubt"] = doubt;
 }
 
-void print_findings(const std::vector<Finding>& findings, bool force, bool quiet) {
+void print_findings(const std::vector<Finding>& findings, const char* work, bool force, bool quiet) {
   if (const std::string errors = errors_text(findings); !errors.empty() && !force)
-    throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors + " (--force combines them anyway)");
+    throw Error(ErrorCode::kInput, fmt::format("the inputs do not fit: {} (--force {} them anyway)", errors, work));
   for (const Finding& f : findings) {
     const bool note = f.severity == Finding::Severity::kNote;
     if (!note || !quiet) fmt::print(stderr, "{}: {}\n", note ? "note" : "warning", as_options(f.text));

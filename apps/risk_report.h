@@ -21,8 +21,8 @@ namespace covary {
 std::string prediction_text(const PredictedError& predicted, const std::optional<MeasuredRisks>& risks);
 
 /// Lines on stderr: problems of the inputs and, unless `quiet`, notes. Throws Error(kInput) instead if there are
-/// errors, unless `force` turns them into warnings.
-void print_findings(const std::vector<Finding>& findings, bool force, bool quiet);
+/// errors, unless `force` turns them into warnings. `work`: what the command does then, e.g. "combines".
+void print_findings(const std::vector<Finding>& findings, const char* work, bool force, bool quiet);
 /// Lines on stderr: the missing network, and `note`, if any.
 void print_notes(const DenoisingChoice& choice, const std::string& note);
 /// These notes of an image, followed by its risks.

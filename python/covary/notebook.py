@@ -30,6 +30,9 @@ class View:
         part.write_text(self.page, encoding="utf-8")
         part.replace(target)
 
+    def __repr__(self) -> str:
+        return f"<covary.View, a page of {len(self.page) / 1e6:.1f} MB: shown by a notebook, written by save()>"
+
     def _repr_html_(self) -> str:
         return (f'<iframe srcdoc="{html.escape(self.page)}" width="100%" height="{self.height}" '
                 'style="border: 0"></iframe>')

@@ -22,6 +22,8 @@ constexpr const char* kArrays = "an array of NumPy or PyTorch, or one with DLPac
                              const std::string& found) {
   std::string message = fmt::format("{}: found {}; expected {}, of float32 [{}]", name,
                                     found.empty() ? describe(object) : found, kArrays, shape);
+  if (nb::isinstance<nb::list>(object) || nb::isinstance<nb::tuple>(object))
+    message += "; numpy.stack(images) makes one of several";
   if (nb::hasattr(object, "dtype")) message += "; convert with array.astype(numpy.float32), or tensor.float()";
   throw nb::type_error(message.c_str());
 }

@@ -150,12 +150,15 @@ bool is_clipped(const Values& v, long pixels) {
 
 void check_values(const ImageNames& names, long pixels, const Values& v, std::vector<Finding>& findings) {
   const std::string& name = names.image;
-  if (v.nonfinite)
+  if (v.nonfinite) {
+    const bool too_many = v.nonfinite > kMostLeftOut * static_cast<double>(pixels);
     findings.push_back(
-        {v.nonfinite > kMostLeftOut * static_cast<double>(pixels) ? Severity::kError : Severity::kWarning,
+        {too_many ? Severity::kError : Severity::kWarning,
          fmt::format("{}: {} of {} pixels hold NaN, infinite or overflowing values, the first at ({}, {}) in {}; "
-                     "these values are left out; find the cause in the renderer",
-                     name, v.nonfinite, pixels, v.bad_x, v.bad_y, names.render(static_cast<size_t>(v.bad_group)))});
+                     "{}; find the cause in the renderer",
+                     name, v.nonfinite, pixels, v.bad_x, v.bad_y, names.render(static_cast<size_t>(v.bad_group)),
+                     too_many ? "these are too many to be left out" : "these values are left out")});
+  }
   if (v.negative)
     findings.push_back({Severity::kWarning,
                         fmt::format("{}: {} of {} pixels hold negative values; spectral renderers make them of colours "

@@ -387,6 +387,7 @@ class Denoise(RenderTest):
         out = ("-o", "out.exr", *PLAIN)
         self.good("denoise", "a.exr", "b.exr", *out)
         self.bad(1, "exposure", "denoise", "a.exr", "bright.exr", *out)
+        self.bad(1, "(--force denoises them anyway)", "denoise", "a.exr", "bright.exr", *out)
         self.bad(1, "they were denoised before", "denoise", "smooth0.exr", "smooth1.exr", *out)
         forced = self.good("denoise", "smooth0.exr", "smooth1.exr", *out, "--force").stderr
         self.assertRegex(forced, "warning: .*they were denoised before")

@@ -95,6 +95,7 @@ class BadArrays(PackageTest):
             self.assertTrue(message.startswith(f"crn: found {found}; expected an array of NumPy"), message)
             self.assertIn("of float32 [T, H, W, 3]", message)
         self.assertIn("independent: found", self.refused(CRN, None, TypeError))
+        self.assertIn("; numpy.stack(images) makes one of several", self.refused(CRN, list(INDEPENDENT), TypeError))
         self.assertTrue(self.refused(None, error=covary.UsageError, denoise="none").startswith(
             "crn: found None; without it"))
 

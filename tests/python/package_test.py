@@ -109,6 +109,7 @@ class Notebook(PackageTest):
         self.assertIn('"mine"', page)
         html = covary.view([image, image], small=True)._repr_html_()
         self.assertTrue(html.startswith('<iframe srcdoc="&lt;!'), html[:60])
+        self.assertRegex(repr(covary.view([image, image], small=True)), r"^<covary.View, a page of \d\.\d MB: shown ")
         self.assertIn("found the name 'a/b'", self.message_of(ValueError, covary.view, {"a/b": image}))
         self.assertIn("missing.exr", self.message_of(covary.Error, covary.view, ["missing.exr"]))
 
