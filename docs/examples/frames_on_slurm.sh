@@ -24,6 +24,8 @@ if [ "${1-}" = --join ]; then
 fi
 
 [ $# -ge 4 ] && [[ $2 = *#* && $3 = *-* ]] || { sed -n '3,7s/^# //p' "$0" >&2; exit 2; }
+command -v sbatch > /dev/null ||
+  { echo "$0: no program sbatch here; run this where Slurm takes jobs, mostly the cluster's login node" >&2; exit 1; }
 scene=$(realpath "$1") out=$(realpath -m "$2") frames=$3 samples=${4##*x} waves=1
 [[ $4 != *x* ]] || waves=${4%%x*}
 shift 4

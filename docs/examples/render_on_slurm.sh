@@ -23,6 +23,8 @@ if [ "${1-}" = --join ]; then
 fi
 
 [ $# -ge 4 ] && [ "$4" -ge 2 ] || { sed -n '3,6s/^# //p' "$0" >&2; exit 2; }
+command -v sbatch > /dev/null ||
+  { echo "$0: no program sbatch here; run this where Slurm takes jobs, mostly the cluster's login node" >&2; exit 1; }
 scene=$(realpath "$1") out=$(realpath -m "$2") samples=$3 tasks=$4
 shift 4
 parts=${out%.exr}.parts

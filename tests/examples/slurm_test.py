@@ -118,6 +118,19 @@ class Script(StandIn):
         self.assertFalse((self.path / "out.parts" / "1.log").exists())
 
 
+class WithoutSlurm(Cluster):
+    def test_is_told_before_anything_is_written(self):
+        commands = self.path / "commands"  # all but sbatch
+        commands.mkdir()
+        for name in ("bash", "env", "realpath", "mkdir", "seq", "sed"):
+            (commands / name).symlink_to(shutil.which(name))
+        path = f"{COVARY.parent}:{commands}"
+        for script, output, frames in ((SCRIPT, "out.exr", ()), (FRAMES, "out_#.exr", ("1-3",))):
+            message = self.run_in_folder(script, ROOM, output, *frames, 8, *(() if frames else (3,)), code=1, PATH=path)
+            self.assertIn("no program sbatch here; run this where Slurm takes jobs", message)
+        self.assertEqual([p.name for p in self.path.iterdir()], ["commands"])
+
+
 class Frames(StandIn):
     """docs/examples/frames_on_slurm.sh."""
 
