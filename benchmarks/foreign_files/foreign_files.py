@@ -50,7 +50,7 @@ def main():
     parser.add_argument("--covary", default="build/release/covary")
     parser.add_argument("--commands", default=",".join(COMMANDS), help="default: all")
     options = parser.parse_args()
-    covary = shutil.which(options.covary) or str(Path(options.covary).resolve())
+    covary = str(Path(shutil.which(options.covary) or options.covary).resolve())
     counts = collections.defaultdict(collections.Counter)
     refusals = collections.defaultdict(list)
     bad = False

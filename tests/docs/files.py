@@ -5,7 +5,8 @@ import shutil
 import subprocess
 from pathlib import Path
 
-FRAMES = "1-4"
+N_FRAMES = 48  # of the sequences on the pages
+FRAMES = f"1-{N_FRAMES}"
 
 
 def small_scene(source):
@@ -51,7 +52,7 @@ class Files:
         elif name == "path.json":
             shutil.copy(self.source / "scenes" / "room-path.json", path)
         elif name == "room_####.xml":
-            for frame in range(1, 49):
+            for frame in range(1, N_FRAMES + 1):
                 (self.folder / f"room_{frame:04}.xml").write_text(small_scene(self.source), encoding="utf-8")
         elif name == "views.xml":
             self.views()
@@ -75,7 +76,7 @@ class Files:
         self.make("scene.xml")
         self.covary("render", "scene.xml", "--no-preview", "--estimator", "iicv", "--spp", "24", "--frames", FRAMES,
                     "--passes", "pair_####", "-o", "pair_####.exr")
-        for frame in range(1, 5):
+        for frame in range(1, N_FRAMES + 1):
             for kind in ("crn", "independent"):
                 shutil.copy(self.folder / f"pair_{frame:04}" / f"{kind}.exr",
                             self.folder / f"{kind}_{frame:04}.exr")
