@@ -10,8 +10,10 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <new>
+#include <regex>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -24,6 +26,7 @@
 #include "core/shell_text.h"
 #include "core/unfinished.h"
 #include "interruption.h"
+#include "io/scene_file.h"
 #include "method_options.h"
 #include "version.h"
 
@@ -67,6 +70,20 @@ std::vector<std::string> near_options(const CLI::App& command, const std::string
   return near;
 }
 
+/// The message about an option given more often than it may be, in plain words; other messages as they are.
+std::string in_plain_words(const std::string& message) {
+  std::smatch found;
+  if (!std::regex_match(message, found, std::regex("(.*): At Most 1 required but received (\\d+)"))) return message;
+  return fmt::format("{} is given {} times; give it once", found[1].str(), found[2].str());
+}
+
+/// "; write: covary render room.xml -o room.exr", of the name of a scene in place of a command.
+std::string scene_without_command(const std::string& word) {
+  if (!is_scene_file(word)) return "";
+  const std::string output = std::filesystem::path(word).stem().string() + ".exr";
+  return "; write: " + shell_text({"covary", "render", word, "-o", output});
+}
+
 /// What is wrong with the first argument that no option takes; "" if there is none.
 std::string describe_extra(const CLI::App& app) {
   const CLI::App& command = app.get_subcommands().empty() ? app : *app.get_subcommands()[0];
@@ -76,7 +93,8 @@ std::string describe_extra(const CLI::App& app) {
   const std::string extra = extras[0].substr(0, extras[0].find('='));
   const std::string help = "; see '" + name + " --help'";
   if (!extra.starts_with('-')) return "too many arguments, beginning with '" + extra + "'" + help;
-  if (const std::string present = present_form(extra.substr(std::min(extra.find_first_not_of('-'), extra.size())));
+  if (const std::string present =
+          present_form(extra.substr(std::min(extra.find_first_not_of('-'), extra.size())), command);
       !present.empty())
     return fmt::format("unknown option '{}': write {}{}", extra, present, help);
   const std::vector<std::string> near = near_options(command, extra);
@@ -102,8 +120,8 @@ int run(int argc, char** argv) {
     std::vector<std::string> names;
     for (const CLI::App* command : app.get_subcommands(nullptr)) names.push_back(command->get_name());
     if (std::find(names.begin(), names.end(), first) == names.end())
-      throw Error(ErrorCode::kUsage,
-                  "unknown command '" + first + "'" + did_you_mean(first, names) + "; 'covary --help' lists all");
+      throw Error(ErrorCode::kUsage, "unknown command '" + first + "'" + did_you_mean(first, names) +
+                                         scene_without_command(first) + "; 'covary --help' lists all");
   }
   try {
     app.parse(argc, argv);
@@ -116,7 +134,7 @@ int run(int argc, char** argv) {
     const std::string extra = describe_extra(app);
     if (!extra.empty()) throw Error(ErrorCode::kUsage, extra);
     const std::string command = app.get_subcommands().empty() ? "" : " " + app.get_subcommands()[0]->get_name();
-    throw Error(ErrorCode::kUsage, std::string(error.what()) + "; see 'covary" + command + " --help'");
+    throw Error(ErrorCode::kUsage, in_plain_words(error.what()) + "; see 'covary" + command + " --help'");
   }
   if (app.get_subcommands().empty()) throw Error(ErrorCode::kUsage, "no command given; 'covary --help' lists all");
   check_standard_output();

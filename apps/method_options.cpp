@@ -110,8 +110,16 @@ std::string help_of_method(const std::string& name) {
                      others.empty() ? "" : "\nParameters (--set NAME=VALUE):\n" + others);
 }
 
-std::string present_form(std::string_view name) {
+std::string present_form(std::string_view name, const CLI::App& command) {
   if (find_option(parameters(), name)) return fmt::format("--set {}=VALUE", name);
+  // What other programs call it.
+  static constexpr std::pair<std::string_view, const char*> kElsewhere[] = {
+      {"bounces", "--max-depth"}, {"depth", "--max-depth"}, {"envmap", "--environment"},
+      {"height", "--resolution"}, {"out", "--output"},      {"samples", "--spp"},
+      {"sensor", "--camera"},     {"size", "--resolution"}, {"width", "--resolution"}};
+  for (const auto& [word, option] : kElsewhere)
+    if (const CLI::Option* known = name == word ? command.get_option_no_throw(option) : nullptr)
+      return fmt::format("{} {}", option, known->get_type_name());
   static constexpr std::pair<std::string_view, const char*> kFormer[] = {
       {"asymmetric", "--set penalty=asymmetric"},
       {"cv-surrogate", "--set cv-variance=relative-oidn"},

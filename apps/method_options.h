@@ -28,8 +28,8 @@ std::string as_options(const std::string& text);
 /// that name.
 std::string help_of_method(const std::string& name);
 
-/// What to write instead of the option `name`, given without dashes, of earlier versions, e.g. "--set cv-grid=VALUE";
-/// "" if there never was such an option.
-std::string present_form(std::string_view name);
+/// What to write instead of the option `name`, given without dashes, of earlier versions or of other programs, e.g.
+/// "--set cv-grid=VALUE" or "--spp INT"; "" if none is known that `command` has.
+std::string present_form(std::string_view name, const CLI::App& command);
 
 }  // namespace covary

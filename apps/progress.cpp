@@ -63,6 +63,11 @@ void ProgressLine::begin(const std::string& phase, uint64_t done) {
   if (!redrawing_.joinable()) redrawing_ = std::thread([this] { redraw_regularly(); });
 }
 
+std::string ProgressLine::phase() const {
+  const std::lock_guard lock(mutex_);
+  return phase_;
+}
+
 void ProgressLine::expect(std::function<double()> seconds_left) {
   const std::lock_guard lock(mutex_);
   expected_ = std::move(seconds_left);

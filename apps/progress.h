@@ -27,6 +27,8 @@ class ProgressLine {
   /// Starts a phase, such as "loading", shown with its seconds until update() reports progress. `done`: where update()
   /// counts on from.
   void begin(const std::string& phase, uint64_t done = 0);
+  /// The phase that began last.
+  std::string phase() const;
   /// Until the next begin(). Of the phase: a function for the seconds left, if update() does not tell; none are shown
   /// if it says 0 or less. After the phase: work that takes as long as so many units of update(), and seconds.
   void expect(std::function<double()> seconds_left);
@@ -61,7 +63,7 @@ class ProgressLine {
 
   const std::string label_;
   const bool quiet_, terminal_;
-  std::mutex mutex_;  // of all below
+  mutable std::mutex mutex_;  // of all below
   std::string phase_, shown_, reached_;
   uint64_t done_ = 0, total_ = 0, least_total_ = 0;
   uint64_t first_ = 0;  // done_ when the phase began

@@ -104,8 +104,13 @@ void write_stages(const RenderOptions& options, const RenderResult& result) {
       settings, {first.frame_width(), first.frame_height(), first.crop()});
 }
 
-std::string interruption(const RenderOptions& options, const RenderResult& result) {
-  if (result.kept.empty()) return "interrupted before the first sample; nothing was written";
+std::string interruption(const RenderReport& report) {
+  const auto& [options, scene, result, load_seconds, threads, last_phase] = report;
+  if (result.kept.empty()) {
+    const bool in_samples = last_phase == name_of(RenderStage::kRendering, "");
+    return fmt::format("interrupted {}before the first sample of the picture; nothing was written",
+                       in_samples ? "" : fmt::format("during {}, ", last_phase));
+  }
   return fmt::format(
       "interrupted after {:.1f} of {:g} samples per pixel; '{}' is the image so far{}; the same command "
       "with --resume continues",
@@ -117,10 +122,10 @@ std::string interruption(const RenderOptions& options, const RenderResult& resul
 }  // namespace
 
 void report(const RenderReport& report, const StopFlag& stop, const std::string& frame) {
-  const auto& [options, scene, result, load_seconds, threads] = report;
+  const auto& [options, scene, result, load_seconds, threads, last_phase] = report;
   for (const Pass& pass : result.passes) report_bad_samples(options, pass);
   if (!options.json.empty()) write_text_output(options.json, json_text(statistics(report)));
-  if (result.interrupted) throw Unfinished(stop.exit_code(), interruption(options, result));
+  if (result.interrupted) throw Unfinished(stop.exit_code(), interruption(report));
   if (result.preview_stops != 0 && options.request().exposure == kAutomaticExposure)
     fmt::print(stderr, "note: '{}' is exposed by {:+g} stops, or much of it would be burnt or black (--exposure)\n",
                preview_path(options.request().output), result.preview_stops);
@@ -246,7 +251,7 @@ void render(RenderOptions options) {
   const RenderResult result =
       render_watched(options, scene, make_request(options, scene), display.get(), progress, *stop, live.get());
   const std::optional<Unfinished> missed =
-      report_with_page({options, scene, result, load_seconds, threads}, *stop, page);
+      report_with_page({options, scene, result, load_seconds, threads, progress.phase()}, *stop, page);
   stop.reset();  // there is nothing more to save
   if (result.complete) write_stages(options, result);
   if (missed) throw *missed;

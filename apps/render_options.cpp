@@ -2,11 +2,13 @@
 #include "render_options.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <limits>
+#include <map>
 
 #include "command_description.h"
 #include "commands.h"
@@ -32,6 +34,9 @@ void check_options(RenderOptions& options) {
   RenderSettings& settings = options.settings;
   if (!options.is_replay() && settings.request.output.empty())
     usage("no output given; use -o OUT.exr (or --replay X,Y,SAMPLE)");
+  if (const fs::path output = settings.request.output; !options.is_replay() && output.extension() == ".png")
+    usage(fmt::format("-o '{}': the name must end in .exr; with -o '{}', '{}' is written, too, to look at",
+                      output.string(), fs::path(output).replace_extension(".exr").string(), output.string()));
   const Method method = estimator_of(options);
   check_given(options.values, settings, method);
   check_stages(options.stages, method);
@@ -72,11 +77,18 @@ Plan make_plan(const RenderOptions& options) { return render_plan(options.settin
 RenderRequest make_request(const RenderOptions& options, const LoadedScene& scene) {
   RenderRequest request = request_of(options.settings, scene);
   if (options.replay.empty() && request.load_training.empty()) take_training(scene, request);
-  request.attributes = {
-      {film_key::kVersion, COVARY_VERSION},
-      {film_key::kCommand, command_line()},
-      {film_key::kMadeOf, made_of(scene.content_hash, {options.values, options.of_integrator, options.of_estimator})}};
+  request.attributes = {{film_key::kVersion, COVARY_VERSION},
+                        {film_key::kCommand, command_line()},
+                        {film_key::kMadeOf, made_of(options, scene)}};
   return request;
+}
+
+std::string made_of(const RenderOptions& options, const LoadedScene& scene, const OptionValues& of_frame) {
+  OptionValues of_file;
+  if (!options.scene_options.defines.empty())
+    of_file["define"] = fmt::format("{}", fmt::join(options.scene_options.defines, " "));
+  if (options.scene_options.ignore_unknown) of_file["ignore-unknown"] = "";
+  return made_of(scene.content_hash, {options.values, options.of_integrator, options.of_estimator, of_file, of_frame});
 }
 
 uint64_t replayed_light_path(const RenderOptions& options) {
@@ -106,6 +118,30 @@ std::vector<SampleAddress> replayed_samples(const RenderOptions& options) {
 
 namespace {
 
+/// The files of the small scenes, by name, in the program's installation or source tree.
+std::map<std::string, std::string> builtin_scenes() {
+  const fs::path beside = fs::path(program_path()).parent_path();
+  std::map<std::string, std::string> files;
+  std::error_code ignored;
+  for (const fs::path& tree : {beside / ".." / "share" / "covary", beside / ".." / ".."})
+    for (const fs::directory_entry& entry : fs::directory_iterator(tree / "scenes", ignored))
+      if (const fs::path& file = entry.path(); file.extension() == ".xml")
+        files.emplace(file.stem().string(), file.lexically_normal().string());
+  return files;
+}
+
+/// Likewise; a word that is no file's name, and no scene's, is an error.
+std::string known_scene_file(const std::string& word) {
+  const std::string file = scene_file(word);
+  const bool is_name = file == word && fs::path(word).filename() == word && !fs::path(word).has_extension();
+  if (!is_name || fs::exists(word)) return file;
+  std::vector<std::string> names;
+  for (const auto& [name, path] : builtin_scenes()) names.push_back(name);
+  throw Error(ErrorCode::kIo,
+              fmt::format("there is no file '{}', and no built-in scene of that name{}; built-in are {}", word,
+                          did_you_mean(word, names), fmt::join(names, ", ")));
+}
+
 void add_output_options(CLI::App& command, RenderOptions& o) {
   command.option_defaults()->group("Output");
   add_value(command, "--display-server", o.display_server, kServerValue,
@@ -120,19 +156,17 @@ void add_output_options(CLI::App& command, RenderOptions& o) {
 }  // namespace
 
 std::string scene_file(const std::string& word) {
-  const fs::path beside = fs::path(program_path()).parent_path();
-  if (!fs::exists(word) && fs::path(word).filename() == word)
-    for (const fs::path& tree : {beside / ".." / "share" / "covary", beside / ".." / ".."})
-      if (const fs::path file = tree / "scenes" / (word + ".xml"); fs::exists(file))
-        return file.lexically_normal().string();
-  return word;
+  if (fs::exists(word) || fs::path(word).filename() != word) return word;
+  const std::map<std::string, std::string> files = builtin_scenes();
+  const auto found = files.find(word);
+  return found == files.end() ? word : found->second;
 }
 
 std::string program_path() { return fs::read_symlink("/proc/self/exe").string(); }
 
 void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_option("SCENE", o.scene, "Scene: Mitsuba XML, pbrt or glTF; or the name of a built-in one, such as room")
-      ->transform(scene_file)
+      ->transform(known_scene_file)
       ->required();
   add_options(command, options_of<RenderSettings>(), o.values);
   add_scene_options(command, o.scene_options);

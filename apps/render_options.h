@@ -50,6 +50,8 @@ LoadedScene load(const RenderOptions& options);
 Method estimator_of(const RenderOptions& options);
 Plan make_plan(const RenderOptions& options);
 RenderRequest make_request(const RenderOptions& options, const LoadedScene& scene);
+/// What the image is made of (plans/made_of.h); `of_frame`: what else a frame depends on.
+std::string made_of(const RenderOptions& options, const LoadedScene& scene, const OptionValues& of_frame = {});
 /// The number of the light path of --replay; throws Error(kUsage).
 uint64_t replayed_light_path(const RenderOptions& options);
 /// The sample of --replay: of each film of the plan, or only of the one that --sampling names.

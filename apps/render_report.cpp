@@ -109,7 +109,7 @@ void add_results(const RenderReport& report, const Method& estimator, nlohmann::
 }  // namespace
 
 nlohmann::ordered_json statistics(const RenderReport& report) {
-  const auto& [options, scene, result, load_seconds, threads] = report;
+  const auto& [options, scene, result, load_seconds, threads, last_phase] = report;
   const RenderRequest request = make_request(options, scene);
   const Method estimator = estimator_of(options);
   const CropWindow window = window_of(scene, request);

@@ -69,12 +69,12 @@ std::string frame_made_of(const RenderOptions& one, const LoadedScene& scene, co
   std::string cameras;
   for (const Transform* camera : {&now, &before})
     for (const auto& row : camera->matrix()) cameras += fmt::format(" {}", fmt::join(row, " "));
-  OptionValues of_frame = {{"camera", hash_text(hash_bytes(cameras))}};
-  if (one.sequence.history) of_frame["history"] = "after " + hash_text(hash_bytes(earlier));
-  OptionValues values = one.values;
+  OptionValues of_frame = {{kMadeAtPlace, hash_text(hash_bytes(cameras))}};
+  if (scene.scene->moves()) of_frame[kMadeAtTime] = fmt::format("{:.9g}", scene.scene->time());
+  if (one.sequence.history) of_frame["history"] = "on", of_frame[kMadeAfter] = hash_text(hash_bytes(earlier));
   const int frame = one.sequence.frames->first;
-  values["seed"] = std::to_string(one.request().seed - SequenceSettings::seed_offset(frame));  // as in the command
-  return made_of(scene.content_hash, {values, one.of_integrator, one.of_estimator, of_frame});
+  of_frame["seed"] = std::to_string(one.request().seed - SequenceSettings::seed_offset(frame));  // as in the command
+  return made_of(one, scene, of_frame);
 }
 
 /// Whether the file is the complete frame. Throws if it is a complete image of something else.
@@ -228,7 +228,7 @@ class SequenceRender {
     progress.repeats(static_cast<int>(frames_.size() - index - 1), n_made_ ? seconds_made_ / n_made_ : 0);
     const RenderResult result = render_watched(one, *scene_, request, display_.get(), progress, stop);
     if (!preview_stops_) preview_stops_ = result.preview_stops;  // or the frames would flicker
-    const RenderReport made{one, *scene_, result, load_seconds_, threads_};
+    const RenderReport made{one, *scene_, result, load_seconds_, threads_, progress.phase()};
     PhaseTimes times = phase_times(made);
     if (n_made_ > 0 && !has_many_scenes()) times.loading = 0;
     times_made_ += times;

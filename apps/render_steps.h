@@ -25,6 +25,7 @@ struct RenderReport {
   const RenderResult& result;
   double load_seconds = 0;  ///< for reading the scene, without building the BVH
   int threads = 0;
+  std::string last_phase;  ///< that the render began
 };
 
 /// The object of --json.

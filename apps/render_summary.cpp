@@ -23,6 +23,8 @@ namespace {
 /// The error of a result falls like samples^-p: of means, of control variates, and of denoised images (measured on ten
 /// scenes from 16 to 64 samples: docs/notes/denoising.md, docs/methods/iicv.md).
 constexpr double kFallOfMeans = 1, kFallOfPairs = 0.75, kFallOfDenoised = 0.5;
+/// The predicted error is mostly that of few pixels if it is more than so many times that of nearly all blocks.
+constexpr double kManyTimes = 4;
 /// Most of the time, and a render for which it matters.
 constexpr double kMostTime = 0.5, kLongSeconds = 5;
 
@@ -35,8 +37,8 @@ double fall_of(const RenderOptions& options) {
 std::string percent_text(double relmse) { return fmt::format("{:.2g} %", 100 * std::sqrt(std::max(0.0, relmse))); }
 
 /// ": `--spp 64` halves it", ": about 2.8 % with `--spp 64`"; empty if so many samples are too many.
-std::string more_samples(const RenderReport& report) {
-  const double samples = std::round(report.result.samples_per_pixel()), relmse = report.result.predicted->relmse;
+std::string more_samples(const RenderReport& report, double relmse) {
+  const double samples = std::round(report.result.samples_per_pixel());
   if (samples < 1 || 4 * samples > kMostSamples || report.options.request().until > 0) return "";
   const double factor = std::pow(4, -fall_of(report.options) / 2);
   if (factor <= 0.5) return fmt::format("; `--spp {:g}` halves it", 4 * samples);
@@ -59,11 +61,15 @@ std::string quality_text(const RenderReport& report) {
   const RenderResult& result = report.result;
   if (!result.predicted) return "unknown, as no error is predicted here";
   const bool blurred = result.image.risks && result.image.risks->bias_share > 0.5;
+  // A few pixels that may be fireflies would say nothing about the rest.
+  const bool by_few = result.predicted->relmse > kManyTimes * result.predicted_blocks && result.predicted_blocks > 0;
+  const double relmse = by_few ? result.predicted_blocks : result.predicted->relmse;
   std::string text =
-      fmt::format("about {} {} left", percent_text(result.predicted->relmse), blurred ? "error" : "grain");
+      fmt::format("{} {} {} left{}", by_few ? "at most" : "about", percent_text(relmse), blurred ? "error" : "grain",
+                  by_few ? " in 95 % of the picture, more in few bright pixels" : "");
   if (!result.predicted->doubt.empty()) text += " (unsure: `--verbose` says why)";
   if (result.until_reached.value_or(false)) text += ", as asked by --until";
-  return text + more_samples(report);
+  return text + more_samples(report, relmse);
 }
 
 /// What to do for a better picture; empty if there is nothing in particular.
@@ -83,7 +89,7 @@ std::string next_text(const RenderReport& report, const PhaseTimes& times) {
 
 /// Behind --verbose: speeds, integrator, estimator, and the predicted error with its interval.
 void print_details(const RenderReport& report) {
-  const auto& [options, scene, result, load_seconds, threads] = report;
+  const auto& [options, scene, result, load_seconds, threads, last_phase] = report;
   const double seconds = std::max(result.render_seconds(), 1e-9);
   fmt::print(stderr, "load {:.2f} s, build {:.2f} s, render {:.2f} s ({} samples/s, {} rays/s)\n", load_seconds,
              scene.scene->build_seconds(), result.render_seconds(),
@@ -118,7 +124,7 @@ PhaseTimes phase_times(const RenderReport& report) {
 }
 
 void print_summary(const RenderReport& report) {
-  const auto& [options, scene, result, load_seconds, threads] = report;
+  const auto& [options, scene, result, load_seconds, threads, last_phase] = report;
   const RenderRequest& request = options.request();
   const PhaseTimes times = phase_times(report);
   if (options.verbose) print_details(report);

@@ -18,11 +18,17 @@ constexpr const char* kOfTheFile[] = {"output",     "passes",   "resume",       
                                       "checkpoint", "exposure", "save-training", "no-preview"};
 constexpr const char* kGoals[] = {"spp", "time", "until", "max-spp"};
 constexpr const char* kScene = "scene";
+/// Options and places that the scene's hash covers, too.
+constexpr const char* kOfScene[] = {"background",     "camera",     "define",     "environment",
+                                    "ignore-unknown", "resolution", kMadeAtPlace, kMadeAtTime};
 
 template <size_t N>
 bool is_among(const char* const (&names)[N], const std::string& name) {
   return std::find(std::begin(names), std::end(names), name) != std::end(names);
 }
+
+/// Whether the values say nothing to people.
+bool is_hash(const std::string& name) { return name == kMadeAtPlace || name == kMadeAfter; }
 
 std::map<std::string, std::string> lines_of(const std::string& text) {
   std::map<std::string, std::string> lines;
@@ -56,17 +62,21 @@ std::string differences(const std::string& earlier, const std::string& now, bool
   for (const auto* lines : {&before, &after})
     for (const auto& [name, value] : *lines) names.insert(name);
   std::string text;
+  bool scene_explained = false;
   const auto value_in = [](const std::map<std::string, std::string>& lines, const std::string& name) {
     const auto found = lines.find(name);
     return found == lines.end() ? "default" : found->second.empty() ? "on" : found->second;
   };
   for (const std::string& name : names) {
     const std::string old_value = value_in(before, name), new_value = value_in(after, name);
-    if (old_value == new_value || (continues && is_among(kGoals, name))) continue;
+    if (old_value == new_value || name == kScene || (continues && is_among(kGoals, name))) continue;
+    if (name == kMadeAfter && (!before.contains(name) || !after.contains(name))) continue;  // told as the history
+    scene_explained = scene_explained || is_among(kOfScene, name);
     text += text.empty() ? "" : "; ";
-    text +=
-        name == kScene ? "another scene, or a changed one" : fmt::format("{} {}, now {}", name, old_value, new_value);
+    text += is_hash(name) ? fmt::format("another {}", name) : fmt::format("{} {}, now {}", name, old_value, new_value);
   }
+  if (!scene_explained && value_in(before, kScene) != value_in(after, kScene))
+    text += fmt::format("{}another scene, or a changed one", text.empty() ? "" : "; ");
   return text;
 }
 

@@ -15,12 +15,17 @@ namespace film_key {
 inline constexpr const char* kMadeOf = "made_of";
 }  // namespace film_key
 
+/// Names of what is no option: hashes of the camera's place and of the frame before, and the scene's time.
+inline constexpr const char *kMadeAtPlace = "place of the camera", *kMadeAfter = "previous frame",
+                            *kMadeAtTime = "time";
+
 /// A line "name=value" for the scene's hash and each option that changes the image; options that say where it goes, or
 /// whether it continues, are left out.
 std::string made_of(const std::string& scene_hash, const std::vector<OptionValues>& options);
 
-/// What differs between two texts of made_of(): "spp 16, now 64; another scene"; empty if nothing does. `continues`: a
-/// higher or lower limit of samples, time or error is no difference.
+/// What differs between two texts of made_of(): "spp 16, now 64; another scene, or a changed one"; empty if nothing
+/// does. The scene is named only if no option that changes it is. `continues`: a higher or lower limit of samples, time
+/// or error is no difference.
 std::string differences(const std::string& earlier, const std::string& now, bool continues = false);
 
 /// Throws Error(kInput) if the file at `path` is an image that covary made with other settings, according to its

@@ -110,6 +110,15 @@ bool is_unfinished_film(const std::string& path) {
   }
 }
 
+bool is_film_file(const std::string& path) {
+  try {
+    read_film_attributes(path);
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
 /// Only replaces films in the folder itself.
 void check_replaceable(const std::string& path) {
   try {
@@ -149,7 +158,7 @@ void check_earlier_films(const Plan& plan, const RenderRequest& request) {
   if (request.output.empty() || request.overwrite) return;
   const bool is_film = outputs_film(plan, request);
   // With a folder for films, the output is a copy of one.
-  const bool continues = request.resume && (is_film || !request.passes.empty());
+  const bool continues = request.resume && (is_film ? is_film_file(request.output) : !request.passes.empty());
   if (!continues && is_unfinished_film(request.output))
     throw Error(ErrorCode::kInput,
                 fmt::format("'{}' is the film of an interrupted render; {}", request.output,

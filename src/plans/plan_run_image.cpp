@@ -156,10 +156,10 @@ void PlanRun::keep_films_of_failure() noexcept {
 }
 
 void PlanRun::write_files() {
-  begin(RenderStage::kWriting);
   result_.integrator = state_.integrator;
   result_.passes = std::move(state_.passes);
   if (result_.interrupted && result_.samples_per_pixel() == 0) return;
+  begin(RenderStage::kWriting);
   const bool is_film = is_output(result_.passes[0], request_);
   if (plan_.makes_film() && has_training())
     result_.image.estimate = with_training(result_.passes[0].film, result_.training);

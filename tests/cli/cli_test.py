@@ -91,6 +91,15 @@ class Help(CliTest):
         self.bad(2, "unknown option '--resol'; did you mean '--resolution'?", "render", "a.xml", "--resol", "8x8")
         self.bad(2, "--reference is required; see 'covary compare --help'", "compare", "a.exr")
         self.bad(2, "too many arguments, beginning with 'b.exr'", "info", "a.exr", "b.exr")
+        self.bad(2, "unknown command 'my room.xml'; write: covary render 'my room.xml' -o 'my room.exr'; ",
+                 "my room.xml")
+        self.bad(2, "--spp is given 2 times; give it once; see", "render", "a.xml", "--spp", "8", "--spp", "16")
+
+    def test_options_of_other_programs(self):
+        for given, here in (("--samples=8", "--spp INT"), ("--width", "--resolution WIDTHxHEIGHT"),
+                            ("--sensor", "--camera NAME|NUMBER|auto"), ("--depth", "--max-depth INT")):
+            self.bad(2, f"unknown option '{given.split('=')[0]}': write {here}; see", "render", "a.xml", given)
+        self.bad(2, "unknown option '--samples'; see", "view", "a.exr", "--samples", "8")  # which has no --spp
 
     def test_full_standard_output(self):
         name = self.image("a.exr", (1, 2, 3))

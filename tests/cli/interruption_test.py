@@ -95,6 +95,25 @@ class DuringAuxiliaryImages(CliTest):
         self.assertGreater(sum(values["G"]), 0)
 
 
+class DuringTraining(CliTest):
+    """It has no samples of the picture; that is told, with the phase."""
+
+    def test_nothing_is_left(self):
+        room = str(Path(os.environ["SCENES"]) / "room.xml")
+        for integrator in ("guided-path", "controlled-path"):
+            pid, shown = terminal.start(self, (COVARY, "render", room, "--resolution", "480x320", "--spp", "64",
+                                               "--integrator", integrator, "-o", "a.exr"), self.path)
+            text = b""
+            while b"training" not in text:
+                text += os.read(shown, 4096)
+            os.kill(pid, signal.SIGINT)
+            rest, exit_code = terminal.finish(pid, shown)
+            self.assertEqual(exit_code, 130, rest)
+            self.assertIn("interrupted during training, before the first sample of the picture; nothing was written",
+                          rest)
+            self.assertEqual(list(self.path.iterdir()), [])
+
+
 class AtRandomTimes(CliTest):
     """Ctrl-C at any moment of a render: exit code 130, and a picture if there is a sample."""
 

@@ -135,6 +135,61 @@ class Summary(CliTest):
                       "--estimator out", self.good(*RENDER, "--spp", "16", "--estimator", "iicv", "-o", "b.exr").stderr)
         self.assertNotIn("note: ", self.said("--spp", "64", "--denoise", "balanced", "-o", "c.exr"))
 
+    def test_few_bright_pixels_are_not_grain_everywhere(self):
+        """A tiny lamp inside glass lights a wall that is lit evenly: a path in thousands finds it."""
+        (self.path / "rare.xml").write_text("""<scene version="3.0.0"><integrator type="path"/>
+            <sensor type="perspective"><float name="fov" value="40"/><transform name="to_world">
+              <lookat origin="0, 0, 5" target="0, 0, 0" up="0, 1, 0"/></transform></sensor>
+            <emitter type="constant"/>
+            <shape type="rectangle"><transform name="to_world"><scale value="3"/></transform></shape>
+            <shape type="sphere"><point name="center" x="0" y="0" z="7"/><float name="radius" value="0.5"/>
+              <bsdf type="dielectric"/></shape>
+            <shape type="sphere"><point name="center" x="0" y="0" z="7"/><float name="radius" value="0.05"/>
+              <emitter type="area"><rgb name="radiance" value="10000"/></emitter></shape></scene>""")
+        ways = set()
+        for seed in range(4):
+            said = self.good("render", "rare.xml", "--resolution", "128x96", "--spp", "4", "--oidn", "off", "-o",
+                             "a.exr", "--no-preview", "--json", "a.json", "--overwrite", "--seed", str(seed)).stderr
+            facts = json.loads((self.path / "a.json").read_text())
+            few = facts["predicted_relmse"] > 4 * facts["predicted_relmse_p95"]
+            error = facts["predicted_relmse_p95" if few else "predicted_relmse"]
+            ways.add(few)
+            kind = "error" if facts.get("predicted_bias_share", 0) > 0.5 else "grain"
+            self.assertIn(f"how good: {'at most' if few else 'about'} {100 * error ** 0.5:.2g} % {kind} left"
+                          f"{' in 95 % of the picture, more in few bright pixels' if few else ''} (unsure", said)
+        self.assertEqual(ways, {False, True})
+
+    def made(self, name, *options):
+        """-o and the name of an image that is rendered with these options."""
+        self.assertEqual(self.run_covary(*RENDER, *options, "-o", name).returncode, 0)
+        return "-o", name
+
+    def test_what_changes_the_scene_is_named(self):
+        plain = ("--spp", "1", "--estimator", "none")
+        output = self.made("a.exr", *plain)
+        for option, value, told in (("--camera", "auto", "camera default, now auto"),
+                                    ("--environment", "sky", "environment default, now sky"),
+                                    ("--background", "1", "background default, now 1"),
+                                    ("-D", "max_depth=3", "define default, now max_depth=3")):
+            self.bad(1, f"'a.exr' was rendered with other settings ({told}); ", *RENDER, *plain, *output, option, value)
+        (self.path / "room.xml").write_text(Path(ROOM).read_text().replace("0.78", "0.77"))
+        self.bad(1, "'a.exr' was rendered with other settings (another scene, or a changed one); ", "render",
+                 "room.xml", *RENDER[2:], *plain, *output)
+        text = Path(ROOM).read_text()
+        (self.path / "path.json").write_text(json.dumps({"keyframes": [{"time": 0, "to_world": [
+            [-1, 0, 0, 0.5], [0, 1, 0, 1.3], [0, 0, -1, 3.5], [0, 0, 0, 1]]}]}))
+        frames = (*RENDER, *plain, "--frames", "1", "-o", "f_#.exr")
+        self.assertEqual(self.run_covary(*frames).returncode, 0)
+        self.bad(1, "'f_1.exr' was rendered with other settings (another place of the camera); ", *frames,
+                 "--camera-path", "path.json")
+        moving = text.replace("</scene>", """<shape type="sphere"><animation name="to_world">
+            <transform time="1"><translate x="0"/></transform><transform time="2"><translate x="1"/></transform>
+            </animation></shape></scene>""")
+        (self.path / "moving.xml").write_text(moving)
+        frames = ("render", "moving.xml", *RENDER[2:], *plain, "--frames", "2", "-o", "m_#.exr")
+        self.assertEqual(self.run_covary(*frames).returncode, 0)
+        self.bad(1, "'m_2.exr' was rendered with other settings (time 2, now 1); ", *frames, "--fps", "2")
+
     def test_images_of_other_settings_are_not_replaced(self):
         first = (*RENDER, "--spp", "4", "--estimator", "none", "-o", "a.exr")
         for _ in range(2):  # the same may be made again
@@ -144,6 +199,10 @@ class Summary(CliTest):
                  "--seed", "2")
         self.assertEqual(self.run_covary(*RENDER, "--spp", "8", "--estimator", "none", "-o", "a.exr",
                                          "--overwrite").returncode, 0)
+        self.bad(1, "--resume: 'b.exr' was rendered with other settings (estimator none, now default); ", *RENDER,
+                 *self.made("b.exr", "--spp", "4", "--estimator", "none"), "--spp", "4", "--resume")
+        self.bad(1, "--resume: 'c.exr' was rendered with other settings (estimator default, now none); ", *RENDER,
+                 *self.made("c.exr", "--spp", "4"), "--spp", "4", "--estimator", "none", "--resume")
         frames = (*RENDER, "--spp", "4", "--estimator", "none", "--frames", "1-2", "-o", "f_#.exr")
         for _ in range(2):
             self.assertEqual(self.run_covary(*frames).returncode, 0)

@@ -341,6 +341,7 @@ class Files(RenderTest):
     def test_names_say_what_is_written(self):
         for name in ("a.png", "a.jpg", "a.hdr", "a", ROOM):
             self.bad(2, f"-o '{name}': the name must end in .exr", *self.RENDER, "-o", name)
+        self.bad(2, "with -o 'a.exr', 'a.png' is written, too, to look at", *self.RENDER, "-o", "a.png")
         self.bad(2, "--json 'a.exr' names an image", *self.RENDER, "-o", "b.exr", "--json", "a.exr")
         self.bad(2, "--json 'b.png' names an image", *self.RENDER, "-o", "b.exr", "--json", "b.png")
         self.bad(2, "-o '/dev/null' is not a regular file", *self.RENDER, "-o", "/dev/null")
@@ -351,6 +352,8 @@ class Files(RenderTest):
                   for image, scene in (("name.exr", "room"), ("file.exr", ROOM))
                   if self.good("render", scene, *SMALL, "--spp", "4", "--estimator", "none", "-o", image)]
         self.assertEqual(*hashes)
+        self.bad(1, "there is no file 'rooom', and no built-in scene of that name; did you mean 'room'?; built-in are "
+                    "box, ", "render", "rooom", "-o", "out.exr")
         (self.path / "room").write_text("not a scene")  # a file of this name comes first
         self.bad(1, "room", "render", "room", *SMALL, "-o", "out.exr")
 
