@@ -137,9 +137,9 @@ std::string known_scene_file(const std::string& word) {
   if (!is_name || fs::exists(word)) return file;
   std::vector<std::string> names;
   for (const auto& [name, path] : builtin_scenes()) names.push_back(name);
-  throw Error(ErrorCode::kIo,
-              fmt::format("there is no file '{}', and no built-in scene of that name{}; built-in are {}", word,
-                          did_you_mean(word, names), fmt::join(names, ", ")));
+  const std::string known = names.empty() ? "" : fmt::format("; built-in are {}", fmt::join(names, ", "));
+  throw Error(ErrorCode::kIo, fmt::format("there is no file '{}', and no built-in scene of that name{}{}", word,
+                                          did_you_mean(word, names), known));
 }
 
 void add_output_options(CLI::App& command, RenderOptions& o) {

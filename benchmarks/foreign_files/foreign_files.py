@@ -22,7 +22,7 @@ COMMANDS = {
     "combine": ("combine", "--independent", "FILE", "COPY", "--oidn", "off", "--force", "-o", "o.exr", "--overwrite"),
     "compare": ("compare", "COPY", "--reference", "FILE"),
     "convert": ("convert", "FILE", "o.png", "--overwrite"),
-    "view": ("view", "FILE", "-o", "o.html", "--overwrite"),
+    "view": ("view", "FILE", "-o", "o.html"),
 }
 SECONDS = 600
 

@@ -132,6 +132,9 @@ std::vector<std::string> layer_channels(const std::string& path, const std::vect
   if (layer.empty() && pictures.size() > 1)
     fail(path, fmt::format("several pictures, {}; choose one by {}--layer", text_of(pictures),
                            pictures[0].view.empty() ? "" : "--view or "));
+  if (layer.empty() && known.empty() && !channels.empty())
+    fail(path, fmt::format("no channels R G B; choose a channel by --layer, such as '{}' (channels: {})",
+                           channels[0].name, all));
   if (layer.empty()) fail(path, "no channels R G B; choose a layer (" + have + ")");
   std::vector<std::string> candidates;
   for (const Layer& known_layer : layers)

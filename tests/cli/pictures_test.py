@@ -61,6 +61,13 @@ class PicturesTest(CliTest):
 
 
 class Found(PicturesTest):
+    def test_single_channels(self):
+        """Without a picture, a channel can be chosen."""
+        self.write("g.exr", exr({"G": [0.5] * SIZE[0] * SIZE[1], "Z": [1.0] * SIZE[0] * SIZE[1]}, SIZE))
+        self.bad(1, "g.exr: no channels R G B; choose a channel by --layer, such as 'G' (channels: G Z)", "convert",
+                 "g.exr", "g.png")
+        self.good("convert", "g.exr", "g.png", "--layer", "G")
+
     def test_cryptomatte_is_no_group(self):
         crypto = floats(random.Random(5).uniform(-1e9, 1e9) for _ in range(N))
         a, b = self.pair(lambda seed: {**colours("ViewLayer.Combined", noisy(seed)),
