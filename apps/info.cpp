@@ -28,7 +28,7 @@ namespace {
 
 struct InfoOptions {
   std::string path;
-  bool devices = false;
+  bool has_path = false, devices = false;
   SceneOptions scene_options;
   bool json = false;
 };
@@ -120,7 +120,7 @@ void print_text(const ImageInfo& info, const std::string& path) {
 
 /// The devices that `--device` takes.
 void devices_info(const InfoOptions& options) {
-  if (!options.path.empty()) throw Error(ErrorCode::kUsage, "--devices tells of this machine; it takes no file");
+  if (options.has_path) throw Error(ErrorCode::kUsage, "--devices tells of this machine; it takes no file");
   std::vector<std::string> notes;
   const std::vector<device::DeviceInfo> all = device::devices(&notes);
   if (options.json) {
@@ -144,7 +144,7 @@ void devices_info(const InfoOptions& options) {
 
 void info(const InfoOptions& options) {
   if (options.devices) return devices_info(options);
-  if (options.path.empty()) throw Error(ErrorCode::kUsage, "FILE is required, or --devices");
+  if (!options.has_path) throw Error(ErrorCode::kUsage, "FILE is required, or --devices");
   if (is_scene_file(options.path)) return scene_info(options);
   if (!options.scene_options.defines.empty()) throw Error(ErrorCode::kUsage, "-D is for scene files (.xml)");
   const ImageInfo info = describe_image(options.path);
@@ -161,11 +161,15 @@ void info(const InfoOptions& options) {
 void add_info(CLI::App& app) {
   const auto options = std::make_shared<InfoOptions>();
   CLI::App* command = app.add_subcommand("info", "Describe a film, image or scene: size, channels, attributes");
-  add_value(*command, "FILE", options->path, kFileValue, "A film or image, or a scene file (.xml, .pbrt, .glb, .gltf)");
+  const CLI::Option* file = add_value(*command, "FILE", options->path, kFileValue,
+                                      "A film or image, or a scene file (.xml, .pbrt, .glb, .gltf)");
   add_scene_options(*command, options->scene_options);
   command->add_flag("--devices", options->devices, "Instead, the GPUs and other devices that --device takes");
   command->add_flag("--json", options->json, "One JSON object");
-  command->callback([options] { info(*options); });
+  command->callback([options, file] {
+    options->has_path = file->count() > 0;
+    info(*options);
+  });
 }
 
 }  // namespace covary

@@ -27,7 +27,34 @@
 namespace covary {
 namespace fs = std::filesystem;
 
+namespace {
+
+/// The files of the small scenes, by name, in the program's installation or source tree.
+std::map<std::string, std::string> builtin_scenes() {
+  const fs::path beside = fs::path(program_path()).parent_path();
+  std::map<std::string, std::string> files;
+  std::error_code ignored;
+  for (const fs::path& tree : {beside / ".." / "share" / "covary", beside / ".." / ".."})
+    for (const fs::directory_entry& entry : fs::directory_iterator(tree / "scenes", ignored))
+      if (const fs::path& file = entry.path(); file.extension() == ".xml")
+        files.emplace(file.stem().string(), file.lexically_normal().string());
+  return files;
+}
+
+/// A word that is no file's name, and no scene's, is an error.
+void check_scene_name(const std::string& word) {
+  if (fs::path(word).filename() != word || fs::path(word).has_extension() || fs::exists(word)) return;
+  std::vector<std::string> names;
+  for (const auto& [name, path] : builtin_scenes()) names.push_back(name);
+  const std::string known = names.empty() ? "" : fmt::format("; built-in are {}", fmt::join(names, ", "));
+  throw Error(ErrorCode::kIo, fmt::format("there is no file '{}', and no built-in scene of that name{}{}", word,
+                                          did_you_mean(word, names), known));
+}
+
+}  // namespace
+
 void check_options(RenderOptions& options) {
+  check_scene_name(options.scene);
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   options.settings = settings_from<RenderSettings>(options.values);
   options.sequence = settings_from<SequenceSettings>(options.of_sequence);
@@ -118,30 +145,6 @@ std::vector<SampleAddress> replayed_samples(const RenderOptions& options) {
 
 namespace {
 
-/// The files of the small scenes, by name, in the program's installation or source tree.
-std::map<std::string, std::string> builtin_scenes() {
-  const fs::path beside = fs::path(program_path()).parent_path();
-  std::map<std::string, std::string> files;
-  std::error_code ignored;
-  for (const fs::path& tree : {beside / ".." / "share" / "covary", beside / ".." / ".."})
-    for (const fs::directory_entry& entry : fs::directory_iterator(tree / "scenes", ignored))
-      if (const fs::path& file = entry.path(); file.extension() == ".xml")
-        files.emplace(file.stem().string(), file.lexically_normal().string());
-  return files;
-}
-
-/// Likewise; a word that is no file's name, and no scene's, is an error.
-std::string known_scene_file(const std::string& word) {
-  const std::string file = scene_file(word);
-  const bool is_name = file == word && fs::path(word).filename() == word && !fs::path(word).has_extension();
-  if (!is_name || fs::exists(word)) return file;
-  std::vector<std::string> names;
-  for (const auto& [name, path] : builtin_scenes()) names.push_back(name);
-  const std::string known = names.empty() ? "" : fmt::format("; built-in are {}", fmt::join(names, ", "));
-  throw Error(ErrorCode::kIo, fmt::format("there is no file '{}', and no built-in scene of that name{}{}", word,
-                                          did_you_mean(word, names), known));
-}
-
 void add_output_options(CLI::App& command, RenderOptions& o) {
   command.option_defaults()->group("Output");
   add_value(command, "--display-server", o.display_server, kServerValue,
@@ -166,7 +169,7 @@ std::string program_path() { return fs::read_symlink("/proc/self/exe").string();
 
 void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_option("SCENE", o.scene, "Scene: Mitsuba XML, pbrt or glTF; or the name of a built-in one, such as room")
-      ->transform(known_scene_file)
+      ->transform(scene_file)
       ->required();
   add_options(command, options_of<RenderSettings>(), o.values);
   add_scene_options(command, o.scene_options);
