@@ -41,15 +41,15 @@ COMBINE = {"crn": without_none(NO_GROUPS), "independent": NO_GROUPS, "estimator"
            "normal": without_none(NO_IMAGE), "denoising_albedo": without_none(NO_IMAGE),
            "denoising_normal": without_none(NO_IMAGE), "position": without_none(NO_IMAGE),
            "layers": (3, "x", [1], {"a": 3}, {3: NO_IMAGE}), "oidn": ("/nowhere", *NO_TEXT),
-           "std_error": (1, "yes"), "force": NO_FLAG,
+           "device": ("gpu7", *NO_TEXT), "std_error": (1, "yes"), "force": NO_FLAG,
            "progress": NO_FUNCTION}
 METRIC = {"image": NO_GROUPS, "reference": NO_GROUPS, "reference2": NO_IMAGE, "low_dynamic_range": NO_FLAG}
 NO_SCENE = (3, None, [1])
 RENDER = {"scene": (*NO_SCENE, ""), "spp": without_none(NO_SPP), "estimator": ("iicvv", *NO_TEXT),
           "integrator": ("pth", *NO_TEXT), "until": NO_LIMIT, "until_p95": NO_LIMIT,
           "until_relative": NO_LIMIT, "time": NO_LIMIT, "seed": NO_SEED,
-          "denoise": ("yes", *NO_TEXT), "oidn": NO_TEXT, "output": NO_PATH, "passes": NO_PATH,
-          "resume": (True, *NO_FLAG), "overwrite": (True, *NO_FLAG), "checkpoint": (-1, 5, "1", True),
+          "denoise": ("yes", *NO_TEXT), "oidn": NO_TEXT, "device": ("gpu7", *NO_TEXT), "output": NO_PATH,
+          "passes": NO_PATH, "resume": (True, *NO_FLAG), "overwrite": (True, *NO_FLAG), "checkpoint": (-1, 5, "1", True),
           "preview": (True, *NO_FLAG), "aovs": NO_FLAG, "aov_samples": (0, -1, 2.5, "12"),
           "layers": ("dirct", *NO_TEXT),
           "crop": (3, "0,0,4,4", (0, 0, 4), (0, 0, 0, 0), (-1, 0, 4, 4), (0, 0, 4.5, 4), (0, 0, 400, 4)),
