@@ -324,7 +324,7 @@ class Resume(ExperimentTest):
     def test_interrupted_at_a_terminal(self):
         """Ctrl-C reaches every process of the terminal's foreground group. The render then saves its films."""
         self.suite["budgets"], self.suite["seeds"] = [{"spp": 24}], 1
-        long = ("--reference-spp", "8000")
+        long = ("--reference-spp", "4000")
         expected = without_times(self.results(*long, out="whole"))
         command = self.command(*long)
         pid, keyboard = terminal.start(self, command, self.path)
