@@ -11,16 +11,6 @@
 namespace covary::device::cuda {
 namespace {
 
-template <typename Functions>
-struct Loaded {
-  Functions all = {};
-  std::string why;
-  const Functions* get(std::string* reason) const {
-    if (!why.empty() && reason) *reason = why;
-    return why.empty() ? &all : nullptr;
-  }
-};
-
 Loaded<Driver> load_driver() {
   Loaded<Driver> loaded;
   std::string& why = loaded.why;

@@ -16,7 +16,10 @@ class Library {
   Library(const std::vector<std::string>& files, std::string& why) {
     for (const std::string& file : files) {
       handle_ = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
-      if (handle_) return;
+      if (handle_) {
+        why.clear();  // of the files before it
+        return;
+      }
       if (why.empty()) why = dlerror();
     }
   }
@@ -32,6 +35,18 @@ class Library {
 
  private:
   void* handle_ = nullptr;
+};
+
+/// The functions of a library, or why they cannot be had.
+template <typename Functions>
+struct Loaded {
+  Functions all = {};
+  std::string why;
+  /// Null, with the reason, where a function is missing.
+  const Functions* get(std::string* reason) const {
+    if (!why.empty() && reason) *reason = why;
+    return why.empty() ? &all : nullptr;
+  }
 };
 
 }  // namespace covary::device

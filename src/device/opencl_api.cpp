@@ -8,13 +8,8 @@
 namespace covary::device::opencl {
 namespace {
 
-struct Loaded {
-  Functions all = {};
-  std::string why;
-};
-
-Loaded load() {
-  Loaded loaded;
+Loaded<Functions> load() {
+  Loaded<Functions> loaded;
   std::string& why = loaded.why;
   const Library library({"libOpenCL.so.1"}, why);
   if (!library) return loaded;
@@ -47,9 +42,8 @@ Loaded load() {
 }  // namespace
 
 const Functions* functions(std::string* why) {
-  static const Loaded loaded = load();
-  if (!loaded.why.empty() && why) *why = loaded.why;
-  return loaded.why.empty() ? &loaded.all : nullptr;
+  static const Loaded<Functions> loaded = load();
+  return loaded.get(why);
 }
 
 std::string error_name(int code) {
