@@ -7,7 +7,7 @@
 namespace covary::gpu {
 namespace {
 
-constexpr int kCell = 4, kPart = 16;  // as in the kernels
+constexpr int kPart = 16;  // as in the kernels
 constexpr int kErrorPlanes = 7, kBiasPlanes = 19;
 
 /// The sums of the parts of a row, in the order of the kernel image_risk.cl; those of `error` are squared, too.
@@ -17,7 +17,6 @@ constexpr double RiskRow::*kRiskSumsOfParts[] = {
     &RiskRow::light,         &RiskRow::light_of_largest, &RiskRow::squared_deviations,
     &RiskRow::fourth_powers, &RiskRow::spread,           &RiskRow::values};
 
-int cells_in(int pixels) { return (pixels + kCell - 1) / kCell; }
 int parts_in(const HeldOutBuffers& in) { return (in.width + kPart - 1) / kPart; }
 
 device::Kernel kernel(Device& device, const char* file, const char* name, const HeldOutBuffers& in) {

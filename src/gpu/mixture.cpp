@@ -11,14 +11,11 @@
 namespace covary::gpu {
 namespace {
 
-constexpr int kCell = 4;        // as in kernels/mixture.cl
 constexpr int kPartOfRow = 64;  // pixels whose normal equations an item adds
 
 device::Kernel kernel(Device& device, const char* name, int candidates, bool planted_bug = false) {
   return device.kernel("mixture.cl", name, with_bug({fmt::format("M={}", candidates)}, planted_bug));
 }
-
-int cells_in(int pixels) { return (pixels + kCell - 1) / kCell; }
 
 /// The normal equations of the rows that determine the weights of the whole image.
 std::vector<NormalRow> sampled_normal_rows(Device& device, const MixtureBuffers& in) {

@@ -6,11 +6,8 @@
 #include "portable.h"
 #include "groups.h"
 #include "pixels.h"
+#include "guided_cells.h"
 
-#define CELL 4
-#define CELL_RADIUS 7  // of the window, in cells (filters/guided_cells.h)
-#define BANDWIDTH 0.5f
-#define LEAST_SQUARE 1e-4f
 #define PLANES 7  // of cells: guide, a quarter of (M_A - M_B)^2 relative as in relMSE, number of pixels
 #define PART 16   // pixels of a row whose errors are summed
 
@@ -42,17 +39,8 @@ KERNEL relative_error(GLOBAL const float* cells, GLOBAL const float* guide, GLOB
                       int height, GLOBAL float* relative, GLOBAL float* weights) {
   const int x = get_global_id(0), y = get_global_id(1), i = y * width + x;
   if (x >= width || y >= height) return;
-  const int columns = (width + CELL - 1) / CELL, rows = (height + CELL - 1) / CELL;
-  const size_t plane = (size_t)rows * columns;
-  const float r = guide[3 * i], g = guide[3 * i + 1], b = guide[3 * i + 2];
-  const float bandwidth = square((r + g + b) * (BANDWIDTH / 3)) + LEAST_SQUARE;
-  float sums[4] = {0, 0, 0, 0};
-  for (int v = max(0, y / CELL - CELL_RADIUS); v <= min(rows - 1, y / CELL + CELL_RADIUS); ++v)
-    for (int u = max(0, x / CELL - CELL_RADIUS); u <= min(columns - 1, x / CELL + CELL_RADIUS); ++u) {
-      GLOBAL const float* cell = cells + (size_t)v * columns + u;
-      const float w = alike(cell[0] - r, cell[plane] - g, cell[2 * plane] - b, bandwidth);
-      for (int k = 0; k < 4; ++k) sums[k] = fma(w, cell[(3 + k) * plane], sums[k]);
-    }
+  float sums[4];
+  sum_alike(cells, guide, x, y, width, height, 4, sums);
   const float weight = relative_weight(guide + 3 * i), scale = 1 / (max(sums[3], 1e-20f) * weight);
   weights[i] = weight;
   for (int c = 0; c < 3; ++c) relative[3 * i + c] = valid[i] ? sqrt(scale * sums[c]) : 0.0f;

@@ -14,11 +14,8 @@
 #include "portable.h"
 #include "groups.h"
 #include "pixels.h"
+#include "guided_cells.h"
 
-#define CELL 4
-#define CELL_RADIUS 7  // of the window, in cells (filters/guided_cells.h)
-#define BANDWIDTH 0.5f
-#define LEAST_SQUARE 1e-4f
 #define SUMS (M * (M + 1) / 2 + M + 1)  // of the normal equations: upper triangle of A, b, v
 #define RIDGE 1e-3f
 #define SWEEPS 24
@@ -155,18 +152,8 @@ KERNEL mixture_weights(GLOBAL const float* cells, GLOBAL const float* guide, GLO
                        int width, int height, GLOBAL float* weights) {
   const int x = get_global_id(0), y = get_global_id(1), i = y * width + x;
   if (x >= width || y >= height) return;
-  const int columns = (width + CELL - 1) / CELL, rows = (height + CELL - 1) / CELL;
-  const size_t plane = (size_t)rows * columns;
-  const float r = guide[3 * i], g = guide[3 * i + 1], b = guide[3 * i + 2];
-  const float bandwidth = square((r + g + b) * (BANDWIDTH / 3)) + LEAST_SQUARE;
   float sums[SUMS], mixture[M + 1];
-  for (int k = 0; k < SUMS; ++k) sums[k] = 0;
-  for (int v = max(0, y / CELL - CELL_RADIUS); v <= min(rows - 1, y / CELL + CELL_RADIUS); ++v)
-    for (int u = max(0, x / CELL - CELL_RADIUS); u <= min(columns - 1, x / CELL + CELL_RADIUS); ++u) {
-      GLOBAL const float* cell = cells + (size_t)v * columns + u;
-      const float w = alike(cell[0] - r, cell[plane] - g, cell[2 * plane] - b, bandwidth);
-      for (int k = 0; k < SUMS; ++k) sums[k] = fma(w, cell[(3 + k) * plane], sums[k]);
-    }
+  sum_alike(cells, guide, x, y, width, height, SUMS, sums);
   solve_mixture(sums, prior, strength, mixture);
   for (int p = 0; p < M; ++p) weights[(size_t)p * width * height + i] = mixture[p];
 }
