@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sums over the cells around a pixel that look like it (filters/guided_cells.h). The first three planes of cells hold
-// their guides.
-#include "pixels.h"
+// their guides. Needs pixels.h before it.
 
 #define CELL 4
 #define CELL_RADIUS 7  // of the window, in cells
