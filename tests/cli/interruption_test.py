@@ -77,19 +77,25 @@ class WhileDenoising(CliTest):
                 begins.unlink()
 
 
+def interrupted_in(test, phase, *command):
+    """What a terminal shows after Ctrl-C in a phase of a command, which ends with exit code 130."""
+    pid, shown = terminal.start(test, command, test.path)
+    text = b""
+    while phase not in text:
+        text += os.read(shown, 4096)
+    os.kill(pid, signal.SIGINT)
+    rest, exit_code = terminal.finish(pid, shown)
+    test.assertEqual(exit_code, 130, rest)
+    return rest
+
+
 class DuringAuxiliaryImages(CliTest):
     """They come after the first samples, so that there is a picture."""
 
     def test_a_picture_is_left(self):
         room = str(Path(os.environ["SCENES"]) / "room.xml")
-        pid, shown = terminal.start(self, (COVARY, "render", room, "--resolution", "480x320", "--spp", "16", "--oidn",
-                                           "off", "--no-preview", "-o", "a.exr"), self.path)
-        text = b""
-        while b"auxiliary images" not in text:
-            text += os.read(shown, 4096)
-        os.kill(pid, signal.SIGINT)
-        rest, exit_code = terminal.finish(pid, shown)
-        self.assertEqual(exit_code, 130, rest)
+        rest = interrupted_in(self, b"auxiliary images", COVARY, "render", room, "--resolution", "480x320", "--spp",
+                              "16", "--oidn", "off", "--no-preview", "-o", "a.exr")
         self.assertIn("'a.exr' is the image so far", rest)
         values = read_exr((self.path / "a.exr").read_bytes())
         self.assertGreater(sum(values["G"]), 0)
@@ -101,14 +107,8 @@ class DuringTraining(CliTest):
     def test_nothing_is_left(self):
         room = str(Path(os.environ["SCENES"]) / "room.xml")
         for integrator in ("guided-path", "controlled-path"):
-            pid, shown = terminal.start(self, (COVARY, "render", room, "--resolution", "480x320", "--spp", "64",
-                                               "--integrator", integrator, "-o", "a.exr"), self.path)
-            text = b""
-            while b"training" not in text:
-                text += os.read(shown, 4096)
-            os.kill(pid, signal.SIGINT)
-            rest, exit_code = terminal.finish(pid, shown)
-            self.assertEqual(exit_code, 130, rest)
+            rest = interrupted_in(self, b"training", COVARY, "render", room, "--resolution", "480x320", "--spp", "64",
+                                  "--integrator", integrator, "-o", "a.exr")
             self.assertIn("interrupted during training, before the first sample of the picture; nothing was written",
                           rest)
             self.assertEqual(list(self.path.iterdir()), [])
