@@ -36,17 +36,23 @@ struct ControlSettings {
   LightSelection lights = LightSelection::kPower;
   uint32_t grid = kAutomaticGrid;  ///< cells along the longest side of the scene
   uint32_t train_spp = 16;         ///< samples per pixel to learn from
-  uint32_t clusters = 256;         ///< maximum number of light clusters
+  uint32_t clusters = 256;         ///< maximum number of light clusters; see most_clusters()
   VarianceKind variance = VarianceKind::kRelative;
   bool albedo = true;  ///< see by_albedo()
   bool paper = false;  ///< as published, see solves_once() and CacheSettings::published()
 
-  /// Those of [Hua2023] (Sec. 6.1): light selection by triangle, 5000 clusters, 8 samples per pixel; 64 cells.
+  /// Those of [Hua2023] (Sec. 6.1): light selection by triangle, 5000 clusters (500 with kVevoda), 8 samples per pixel;
+  /// 64 cells.
   static ControlSettings published();
 
   bool on() const { return kind != ControlKind::kOff; }
   /// Whether anything is learnt: coefficients, or light selection.
   bool learns() const { return on() || lights == LightSelection::kLearned; }
+  /// Maximum number of light clusters. In the program of [Hua2023], that of [Vevoda2018] has fewer.
+  uint32_t most_clusters() const {
+    constexpr uint32_t kOfVevoda = 500;
+    return paper && kind == ControlKind::kVevoda ? kOfVevoda : clusters;
+  }
   /// Samples per pixel of training, if any.
   uint32_t training_spp() const { return learns() ? train_spp : 0; }
   /// Whether lights are selected as learnt: from the first wave on that ends after at least half of the training.
