@@ -4,6 +4,7 @@
 precision.
 
     colours.exr   soft patches of saturated colours of about the same brightness
+    sea.exr       half blue and half green, of the same brightness
     uniform.exr   one colour everywhere
     sun.exr       a sky that brightens towards the horizon and around a sun of 4.4 degrees"""
 import math
@@ -40,6 +41,11 @@ def colours(w):
     return total
 
 
+def sea(w):
+    green = 1 / (1 + math.exp(-8 * w[0]))
+    return [0.1, 0.2 + 1.8 * green, 0.2 + 1.8 * (1 - green)]
+
+
 def uniform(_):
     return [0.8, 1.0, 1.4]
 
@@ -64,7 +70,7 @@ def image(sky):
 
 
 def main(folder):
-    for sky in (colours, uniform, sun):
+    for sky in (colours, sea, uniform, sun):
         path = pathlib.Path(folder) / f"{sky.__name__}.exr"
         path.write_bytes(exr(image(sky), (WIDTH, HEIGHT), types=dict.fromkeys("RGB", HALF)))
 

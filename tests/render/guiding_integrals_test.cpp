@@ -32,6 +32,7 @@ TEST(GuidingIntegrals, ControlTakesAwayColourNoise) {
   const double mixture = noise_under("colours", ControlKind::kOff);
   EXPECT_LT(noise_under("colours", ControlKind::kRgb), 0.35 * mixture);   // published: 0.32
   EXPECT_LT(noise_under("colours", ControlKind::kMono), 1.05 * mixture);  // published: 0.93
+  EXPECT_LT(noise_under("sea", ControlKind::kRgb), 0.35 * noise_under("sea", ControlKind::kOff));
 }
 
 TEST(GuidingIntegrals, ControlRestoresThePerfectTechnique) {
