@@ -19,6 +19,7 @@ CODE = re.compile(rf"({NAME}(?:(?:, | and ){NAME})*) in `({PATH})`")
 TEST = re.compile(r"[A-Z]\w*\.[A-Z]\w*")
 LINK = re.compile(r"\[([^\]]*)\]\(([^)\s]+)\)")
 NUMBER = re.compile(r"\d[\d,]*(?:\.\d+)?")
+SMALLER = "*As described*, measured smaller"
 STATE = re.compile(rf"\*({'|'.join(STATES)})\*")
 
 
@@ -51,6 +52,11 @@ def states(text):
     """How many items are in each state."""
     found = [STATE.findall(words) for _, words in items(text)]
     return {state: sum(states == [state] for states in found) for state in STATES}
+
+
+def measured_smaller(text):
+    """How many items are as described, but so far measured at a smaller size."""
+    return sum(SMALLER in words for _, words in items(text))
 
 
 def slug(heading):
@@ -222,4 +228,4 @@ def problems(page, text, tree):
     return [f"{page}:{line}: {problem}" for line, problem in found]
 
 
-__all__ = ["STATES", "Tree", "items", "problems", "states", "tables"]
+__all__ = ["STATES", "Tree", "items", "measured_smaller", "problems", "states", "tables"]

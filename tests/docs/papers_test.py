@@ -6,7 +6,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from papers import STATES, Tree, items, problems, states, tables
+from papers import STATES, Tree, items, measured_smaller, problems, states, tables
 
 SOURCE = Path(os.environ["SOURCE"])
 PAGES = sorted(path for path in (SOURCE / "docs" / "papers").glob("*.md") if path.name != "index.md")
@@ -73,6 +73,8 @@ class Planted(unittest.TestCase):
 
     def test_states(self):
         self.assertEqual(states(RIGHT), {"As described": 1, "Differently": 0, "Partly": 0, "Not done": 0})
+        self.assertEqual(measured_smaller(RIGHT), 0)
+        self.assertEqual(measured_smaller(RIGHT.replace("described*:", "described*, measured smaller:")), 1)
 
 
 class Pages(unittest.TestCase):
@@ -85,15 +87,19 @@ class Pages(unittest.TestCase):
     def test_counts(self):
         """The first page's table has what the pages list."""
         counted = {page.name: states(page.read_text(encoding="utf-8")) for page in PAGES}
+        for page in PAGES:
+            counted[page.name]["Measured smaller"] = measured_smaller(page.read_text(encoding="utf-8"))
         self.assertEqual(sum(len(items(page.read_text(encoding="utf-8"))) for page in PAGES), 168)
         head, rows = tables((SOURCE / "docs" / "papers" / "index.md").read_text(encoding="utf-8"))[0]
-        self.assertEqual([cell.lower() for cell in head[1:]], ["all", *(state.lower() for state in STATES)])
+        columns = [*STATES, "Measured smaller"]
+        self.assertEqual([cell.lower() for cell in head[1:]], ["all", *(column.lower() for column in columns)])
         for page, (_, row) in zip(PAGES, rows):
             self.assertIn(f"({page.name})", row[0])
             own = counted[page.name]
-            self.assertEqual([int(cell) for cell in row[1:]], [sum(own.values()), *own.values()], page.name)
-        sums = [sum(own[state] for own in counted.values()) for state in STATES]
-        self.assertEqual([int(cell.strip("*")) for cell in rows[-1][1][1:]], [sum(sums), *sums])
+            self.assertEqual([int(cell) for cell in row[1:]], [sum(own[state] for state in STATES), *own.values()],
+                             page.name)
+        sums = [sum(own[column] for own in counted.values()) for column in columns]
+        self.assertEqual([int(cell.strip("*")) for cell in rows[-1][1][1:]], [sum(sums[:-1]), *sums])
 
 
 if __name__ == "__main__":
