@@ -4,7 +4,9 @@
 the pilot (f), and of an oracle (g), whose penalties are the true squared errors of the independent image. Needs numpy.
 
 (d) to (f) are the program's; (g), which no render can have, is Eqs. (7) and (10) once more, in double precision, and
-so is a second (f), which differs from the program's by its rounding. Errors are relMSE against two references."""
+so is a second (f), which differs from the program's by its rounding. Two more rows have other control variates than the
+nearest values of the CRN image: the nearest pixels, and the nearest values of the independent image. Errors are relMSE
+against two references."""
 import argparse
 import struct
 import subprocess
@@ -68,11 +70,13 @@ def pilot_error(crn, h):
     return (pilot - h) ** 2
 
 
-def estimate(crn, h, error_of_h):
-    """Eq. (7) with the coefficients of Eq. (10), shared by the channels, and the symmetric penalty."""
+def estimate(crn, h, error_of_h, guide=None):
+    """Eq. (7) with the coefficients of Eq. (10), shared by the channels, and the symmetric penalty. `guide`: the image
+    whose nearest values become control variates; default: the CRN image."""
     n_groups = len(crn)
     g = crn.mean(0)
-    chosen = np.argsort(((windows(g, 1e9) - g[:, :, None]) ** 2).sum(-1), -1, kind="stable")[..., :K]
+    guide = g if guide is None else guide
+    chosen = np.argsort(((windows(guide, 1e9) - guide[:, :, None]) ** 2).sum(-1), -1, kind="stable")[..., :K]
     place = np.array(offsets())[chosen]
     height, width = g.shape[:2]
     y = np.clip(np.arange(height)[:, None, None] + place[..., 0], 0, height - 1)
@@ -110,7 +114,10 @@ def images_of(options, folder, references, seed):
         run("combine", *passes, "--estimator", *words, "-o", folder / "image.exr")
         images[name] = colours(channels_of(folder / "image.exr"))
     crn, h = read_groups(folder / "films/crn.exr"), read_groups(folder / "films/independent.exr").mean(0)
-    images["(f) again"] = estimate(crn, h, pilot_error(crn, h))
+    error = pilot_error(crn, h)
+    images["(f) again"] = estimate(crn, h, error)
+    images["(f) nearest pixels"] = estimate(crn, h, error, np.zeros_like(h))
+    images["(f) by independent values"] = estimate(crn, h, error, h)
     images["(g) true errors"] = estimate(crn, h, (h - references.mean(0)) ** 2)
     return images
 

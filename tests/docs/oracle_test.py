@@ -22,6 +22,8 @@ class Oracle(unittest.TestCase):
         told = subprocess.run(command, check=True, capture_output=True, text=True).stdout
         errors = {name: float(error) for name, error in re.findall(r"^(.*): relMSE (\S+),", told, re.M)}
         self.assertAlmostEqual(errors["(f) again"] / errors["(f) pilot"], 1, delta=1e-3)
+        self.assertLess(errors["(f) pilot"], errors["(f) by independent values"], "which choose what is as noisy")
+        self.assertNotEqual(errors["(f) nearest pixels"], errors["(f) again"])
         self.assertLess(errors["(g) true errors"], 0.9 * errors["(f) pilot"])
         self.assertLess(errors["(f) pilot"], errors["(e) sample variance"])
         self.assertLess(errors["(e) sample variance"], errors["(d) baseline"])
