@@ -35,13 +35,13 @@ namespace fs = std::filesystem;
 void list_suites() {
   for (const auto& [name, text] : lab::builtin_suites()) {
     const lab::Suite suite = lab::parse_suite(std::string(text), name);
-    fmt::print("{:18} {}\n", name, suite.title);
+    fmt::print("{:20} {}\n", name, suite.title);
   }
   for (const auto& [name, text] : lab::builtin_papers()) {
     const lab::Paper paper = lab::parse_paper(std::string(text), name);
     std::vector<std::string> parts;
     for (const lab::PaperPart& part : paper.parts) parts.insert(parts.end(), part.names.begin(), part.names.end());
-    fmt::print("{:18} {}; parts: {}\n", name, paper.title, fmt::join(parts, ", "));
+    fmt::print("{:20} {}; parts: {}\n", name, paper.title, fmt::join(parts, ", "));
   }
 }
 

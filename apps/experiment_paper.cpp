@@ -60,16 +60,18 @@ lab::Overrides overrides_of(const ExperimentCommand& command, const lab::Prepare
 void print_estimates(const std::vector<lab::PreparedPart>& parts, const std::vector<lab::ExperimentOptions>& options) {
   lab::TimeEstimator estimator(options[0]);
   double seconds = 0;
-  bool complete = true;
+  std::string left_out;
   for (size_t i = 0; i < parts.size(); ++i) {
     const lab::TimeEstimate estimate = estimator.of(parts[i].suite, options[i].max_pixels);
     const std::string finished = estimate.finished > 0 ? fmt::format(", {} made before", estimate.finished) : "";
     fmt::print(stderr, "{:14} about {:>8}, {} runs{}: {}\n", parts[i].part.names[0], format_duration(estimate.seconds),
                estimate.runs, finished, parts[i].part.title);
-    seconds += estimate.seconds, complete = complete && estimate.complete;
+    seconds += estimate.seconds;
+    if (left_out.empty()) left_out = estimate.left_out;
   }
-  fmt::print(stderr, "{:14} about {:>8}{}, (h:)min:s by the speed of path tracing on cores without other work\n",
-             "together", format_duration(seconds), complete ? "" : " without scenes that cannot be read");
+  fmt::print(stderr, "{:14} about {:>8}, (h:)min:s by the speed of path tracing on cores without other work\n",
+             "together", format_duration(seconds));
+  if (!left_out.empty()) fmt::print(stderr, "{:14} without scenes that do not render: {}\n", "", left_out);
 }
 
 void print_suites(const std::vector<lab::PreparedPart>& parts) {

@@ -48,12 +48,6 @@ std::string part_name(const Part& part) {
   return part.of == 0 ? "" : fmt::format("{}-of-{}", part.number + 1, part.of);
 }
 
-/// The error message of a command, without the command's name in front.
-std::string complaint(const std::string& message) {
-  const std::string line = telling_line(message), name = "covary: ";
-  return line.starts_with(name) ? line.substr(name.size()) : line;
-}
-
 /// Whether the program reported an error, rather than being ended by a signal or an internal error.
 bool says_why(const RunFailure& failure) {
   return (failure.exit_code == 1 || failure.exit_code == 2) &&

@@ -147,4 +147,9 @@ std::string telling_line(const std::string& errors) {
   return errors.substr(begin, last + 1 - begin);
 }
 
+std::string complaint(const std::string& errors) {
+  const std::string line = telling_line(errors), name = "covary: ";
+  return line.starts_with(name) ? line.substr(name.size()) : line;
+}
+
 }  // namespace covary::lab

@@ -29,4 +29,7 @@ ProcessResult run_process(const std::vector<std::string>& command, const std::at
 /// The line of a program's messages that says what is wrong: the first or, of a traceback of Python, the last.
 std::string telling_line(const std::string& errors);
 
+/// The same without covary's name in front.
+std::string complaint(const std::string& errors);
+
 }  // namespace covary::lab

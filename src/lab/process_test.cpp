@@ -75,6 +75,7 @@ TEST(Process, IsInterruptedFromTheFirstMomentOn) {
 TEST(TellingLine, IsTheFirstOrTheLastOfATraceback) {
   EXPECT_EQ(telling_line(""), "");
   EXPECT_EQ(telling_line("covary: no such file\nmore"), "covary: no such file");
+  EXPECT_EQ(complaint("covary: no such file\nmore"), "no such file");
   EXPECT_EQ(telling_line("Traceback (most recent call last):\n  File \"a.py\", line 1\nKeyError: 'x'\n"),
             "KeyError: 'x'");
   EXPECT_EQ(telling_line("Traceback"), "Traceback");

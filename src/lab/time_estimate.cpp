@@ -8,6 +8,7 @@
 #include <set>
 #include <thread>
 
+#include "lab/process.h"
 #include "lab/runner.h"
 
 namespace covary::lab {
@@ -31,27 +32,35 @@ TimeEstimator::TimeEstimator(const ExperimentOptions& options) : options_(option
   if (!options_.reader) options_.reader = std::make_shared<SceneReader>(options_.program, options_.stop);
 }
 
-std::optional<TimeEstimator::Speed> TimeEstimator::speed_of(const Suite& suite, const SceneInstance& scene,
-                                                            const Runner& runner) {
-  const std::string key = fmt::format("{} {}x{} {} {}", scene.hash, scene.frame_width, scene.frame_height,
-                                      fmt::join(scene.entry.defines, " "), fmt::join(suite.common_options, " "));
-  if (const auto known = speeds_.find(key); known != speeds_.end()) return known->second;
+TimeEstimator::Trial TimeEstimator::try_out(const Suite& suite, const SceneInstance& scene, uint32_t spp,
+                                            const Runner& runner) const {
   Suite trial = suite;
-  trial.reference = {kTrialSpp, {}};
+  trial.reference = {spp, {}};
   SceneInstance part = scene;
   part.entry.reference.reset();
   part.window = middle(scene.window);
   if (!part.frames.empty()) part.frames = {scene.frames.front()}, part.entry.frames = fmt::format("{}", part.frames[0]);
   const Run run = reference_runs(trial, part, options_.context).front();
-  std::optional<RunRecord> record = runner.find(run);
-  if (!record) record = runner.execute(run, part).record;
+  Runner::Result result;
+  result.record = runner.find(run);
+  if (!result.record) result = runner.execute(run, part);
   runner.remove_passes(run.passes_key);
-  std::optional<Speed> speed;
-  if (record) {
-    const double cores = options_.threads > 0 ? options_.threads : std::max(1u, std::thread::hardware_concurrency());
-    speed = Speed{record->processor_seconds / cores / run.work, record->load_seconds + kSecondsAround};
-  }
-  return speeds_.emplace(key, speed).first->second;
+  if (result.failure) return {std::nullopt, complaint(result.failure->message)};
+  if (!result.record) return {};  // stopped
+  const double cores = options_.threads > 0 ? options_.threads : std::max(1u, std::thread::hardware_concurrency());
+  return {Speed{result.record->processor_seconds / cores / run.work, result.record->load_seconds + kSecondsAround}, ""};
+}
+
+const TimeEstimator::Trial& TimeEstimator::trial_of(const Suite& suite, const SceneInstance& scene,
+                                                    const Runner& runner) {
+  const std::string key = fmt::format("{} {}x{} {} {}", scene.hash, scene.frame_width, scene.frame_height,
+                                      fmt::join(scene.entry.defines, " "), fmt::join(suite.common_options, " "));
+  if (const auto known = trials_.find(key); known != trials_.end()) return known->second;
+  Trial trial = try_out(suite, scene, kTrialSpp, runner);
+  const uint32_t most = suite.reference_of(scene.entry).spp;
+  for (uint32_t spp = 4 * kTrialSpp; !trial.failure.empty() && spp <= most; spp *= 4)
+    trial = try_out(suite, scene, spp, runner);
+  return trials_.emplace(key, std::move(trial)).first->second;
 }
 
 TimeEstimate TimeEstimator::of(const Suite& suite, int64_t max_pixels) {
@@ -68,15 +77,17 @@ TimeEstimate TimeEstimator::of(const Suite& suite, int64_t max_pixels) {
         ++estimate.runs;
         runner.find(run) ? void(++estimate.finished) : missing.push_back(&run);
       }
-    const std::optional<Speed> speed =
-        plan.failure || missing.empty() ? std::nullopt : speed_of(suite, plan.scene, runner);
-    if (plan.failure || (!speed && !missing.empty())) estimate.complete = false;
-    if (!speed) continue;
+    const Trial trial = plan.failure      ? Trial{std::nullopt, complaint(plan.failure->message)}
+                        : missing.empty() ? Trial{}
+                                          : trial_of(suite, plan.scene, runner);
+    if (!trial.failure.empty() && estimate.left_out.empty())
+      estimate.left_out = suite.scenes[s].name + ": " + trial.failure;
+    if (!trial.speed) continue;
     std::set<std::string> rendered;  // passes
     for (const Run* run : missing) {
       const double work = rendered.insert(run->passes_key).second ? run->work : 0;
       const double budget = run->timed ? suite.budgets[run->budget].seconds : 0;
-      estimate.seconds += budget + work * speed->seconds_per_sample + speed->seconds_per_run;
+      estimate.seconds += budget + work * trial.speed->seconds_per_sample + trial.speed->seconds_per_run;
     }
   }
   return estimate;

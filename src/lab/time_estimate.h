@@ -13,10 +13,11 @@ namespace covary::lab {
 struct TimeEstimate {
   size_t runs = 0, finished = 0;  ///< references included; finished: in the cache
   double seconds = 0;             ///< of those that are not finished
-  bool complete = true;           ///< false: scenes could not be read or rendered, and do not count
+  std::string left_out;           ///< a scene that could not be read or rendered, with the reason; such do not count
 };
 
-/// Renders a few pixels of each scene with few samples, once for all suites, and multiplies their processor time, as on
+/// Renders a few pixels of each scene with few samples, with more of them where so few are refused, as by integrators
+/// that train, once for all suites, and multiplies their processor time, as on
 /// a machine without other work. Assumes that a method takes the time of plain path tracing with the same samples, and
 /// that methods that share passes render them once: bidirectional paths, training and estimators take longer.
 class TimeEstimator {
@@ -29,10 +30,15 @@ class TimeEstimator {
   struct Speed {
     double seconds_per_sample = 0, seconds_per_run = 0;
   };
-  std::optional<Speed> speed_of(const Suite& suite, const SceneInstance& scene, const Runner& runner);
+  struct Trial {
+    std::optional<Speed> speed;
+    std::string failure;
+  };
+  const Trial& trial_of(const Suite& suite, const SceneInstance& scene, const Runner& runner);
+  Trial try_out(const Suite& suite, const SceneInstance& scene, uint32_t spp, const Runner& runner) const;
 
   ExperimentOptions options_;
-  std::map<std::string, std::optional<Speed>> speeds_;  // by key of the trial without its pixels
+  std::map<std::string, Trial> trials_;  // by key of the trial without its pixels
 };
 
 }  // namespace covary::lab

@@ -645,7 +645,9 @@ class References(ExperimentTest):
 
 class BuiltIn(ExperimentTest):
     def test_list(self):
-        names = [line.split()[0] for line in self.run_covary([COVARY, "experiment", "--list"]).stdout.splitlines()]
+        lines = self.run_covary([COVARY, "experiment", "--list"]).stdout.splitlines()
+        self.assertTrue(all(line[20] == " " != line[21] for line in lines), "in columns")
+        names = [line.split()[0] for line in lines]
         self.assertEqual(set(names), {path.stem for path in [*SUITES.glob("*.json"), *SUITES.glob("papers/*.json")]})
         done = self.run_covary([COVARY, "experiment", "iicv-table1", "--print", "--scenes-only", "house", "--seeds",
                                 "2"])
@@ -680,8 +682,9 @@ class Papers(ExperimentTest):
     """A paper's tables and figures, as small as can be."""
 
     def paper(self, *arguments, out="out"):
-        small = ("--seeds", "1", "--reference-spp", "16", "--threads", "2", "--resolution", "16x12")
-        return self.run_covary([COVARY, "experiment", *arguments, *small, "-o", out])
+        small = ("--seeds", "1", "--threads", "2", "--resolution", "16x12")
+        few = () if "--reference-spp" in arguments else ("--reference-spp", "16")
+        return self.run_covary([COVARY, "experiment", *arguments, *small, *few, "-o", out])
 
     def test_parts_make_one_report_and_go_on(self):
         scenes = self.path / "scenes"
@@ -710,6 +713,18 @@ class Papers(ExperimentTest):
         done = self.paper(*command)
         self.assertEqual((done.returncode, self.runs()), (0, runs), done.stderr)
         self.assertRegex(done.stderr, r"fig6 +about +0:00, (\d+) runs, \1 made before")
+
+    def test_estimate_of_parts_that_train(self):
+        """So few samples as are tried first are all training."""
+        parts = ("controlled-mixtures", "--only", "fig7", "--scenes-only", "room, Edges02", "--methods-only", "off",
+                 "--spp", "32")
+        done = self.paper(*parts, "--reference-spp", "64")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stderr, r"fig7 +about +0:0[1-9], 3 runs: Fig\. 7")
+        self.assertNotIn("do not render", done.stderr)
+        done = self.paper(*parts, "--reference-spp", "16", out="few")
+        self.assertIn("without scenes that do not render: room, Edges02: 16 samples per pixel, of which the training "
+                      "takes 16, leave none", done.stderr)
 
     def test_mistakes(self):
         for message, *words in (
