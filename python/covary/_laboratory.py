@@ -54,6 +54,11 @@ class Samples:
     frame: tuple[int, int] = (0, 0)
     crop: tuple[int, int, int, int] = (0, 0, 0, 0)
 
+    def __repr__(self) -> str:
+        budget = f"{self.spp} samples per pixel" if self.spp is not None else f"{self.seconds:g} seconds"
+        width, height = self.crop[2:]
+        return f"<covary.Samples {width} x {height} of {Path(self.scene).name}, {budget}, seed {self.seed}>"
+
     @cached_property
     def image(self) -> FloatArray:
         """The mean of all samples, linear, [H, W, 3]."""

@@ -84,7 +84,8 @@ class Result:
             value = getattr(self, each.name)
             if isinstance(value, (bool, int, float, str)) or value is None:
                 facts[each.name] = value
-        facts.pop("std_error", None), facts.pop("bias", None)
+        for name in ("std_error", "bias", "predicted_bounds"):  # None, where they are not known
+            facts.pop(name, None)
         low, high = self.predicted_bounds or (None, None)
         return {**facts, "predicted_low": low, "predicted_high": high}
 

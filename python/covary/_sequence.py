@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 import threading
 import time
 from collections.abc import Iterable
@@ -112,8 +113,17 @@ def render_frames(scene: str | PathLike[str], output: str | PathLike[str], frame
     files = [_frame_path(pattern, frame) for frame in numbers]
     code, errors = _run([_file_of(fspath(scene)), *arguments, "--quiet"], files, resume, progress)
     if code:
-        raise (UsageError if code == 2 else Error)(errors.strip().removeprefix("covary: "))
+        raise (UsageError if code == 2 else Error)(_as_arguments(errors))
     return files
+
+
+def _as_arguments(message: str) -> str:
+    """The program's message with its options as arguments: "overwrite=True" for "--overwrite"."""
+    def argument(match: re.Match[str]) -> str:
+        name = match[1].replace("-", "_")
+        return f"{name}=True" if name in ("resume", "overwrite", "preview") else name
+
+    return re.sub(r"(?<![\w-])--([a-z][a-z0-9-]*)", argument, message.strip().removeprefix("covary: "))
 
 
 def _run(words: Iterable[str], files: list[Path], keeps: bool,

@@ -21,14 +21,16 @@ class Experiments(PackageTest):
 
         def same(samples):
             film = samples.film()
-            seen.append((samples.seed, samples.spp, samples.seconds, film.groups.shape, samples.layer("N").shape))
+            seen.append((samples.seed, samples.spp, samples.seconds, film.groups.shape, samples.layer("N").shape,
+                         repr(samples)))
             numpy.testing.assert_allclose(film.mean, samples.image, rtol=1e-6)
             return samples.image
 
         found = self.experiment(same=same)
         cells = {cell["method"]: cell for cell in found.results["cells"]}
         self.assertAlmostEqual(cells["same"]["relmse"]["value"], cells["pt"]["relmse"]["value"], 6)
-        self.assertEqual(seen, [(seed, 16, None, (8, 24, 32, 3), (24, 32, 3)) for seed in (1, 2)])
+        self.assertEqual(seen, [(seed, 16, None, (8, 24, 32, 3), (24, 32, 3), "<covary.Samples 32 x 24 of room.xml, 16 "
+                                 f"samples per pixel, seed {seed}>") for seed in (1, 2)])
         self.assertEqual({row["method"] for row in found.rows}, {"pt", "same"})
         self.assertIn("2 cells", repr(found))
         row = next(row for row in found.table if row["method"] == "same")

@@ -165,6 +165,7 @@ class Render(PackageTest):
         self.assertEqual((facts["width"], facts["height"], facts["samples_per_pixel"]), (*SIZE, 8))
         self.assertLess(facts["predicted_low"] or 0, facts["predicted_relmse"])
         self.assertTrue(all(value is None or isinstance(value, (bool, int, float, str)) for value in facts.values()))
+        self.assertEqual(facts.keys(), covary.render(self.scene(), 4, "none").to_dict().keys(), "columns of one table")
 
     def test_advice(self):
         self.assertEqual(covary.render(self.scene(), 16, "iicv").warnings, [
@@ -226,7 +227,7 @@ class Frames(PackageTest):
         before = files[0].stat().st_mtime_ns
         covary.render_frames(ROOM, self.path / "f_##.exr", "1-3", resume=True, **again)
         self.assertEqual(files[0].stat().st_mtime_ns, before, "complete frames stay")
-        self.assertIn("(seed 3, now 4)", self.message_of(
+        self.assertIn("(seed 3, now 4); give another name, or overwrite=True to replace it", self.message_of(
             covary.Error, covary.render_frames, ROOM, self.path / "f_##.exr", "1-3", **{**again, "seed": 4}))
 
     def test_scene_of_the_package_and_options(self):
