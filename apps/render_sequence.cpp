@@ -173,7 +173,7 @@ class SequenceRender {
     const StopFlag stop;
     for (size_t i = 0; i < frames_.size(); ++i) render_frame(i, stop);
     if (stop.is_set()) throw Unfinished(stop.exit_code(), "interrupted when the last frame was written");
-    if (!options_.quiet && n_made_ > 0) print_frames(options_, n_made_, times_made_);
+    if (!options_.quiet && n_made_ > 0) print_frames(options_, n_made_, static_cast<int>(frames_.size()), times_made_);
     if (!missed_.empty())
       throw Unfinished(kTargetMissed, fmt::format("frames {} did not reach their target", fmt::join(missed_, ", ")));
   }

@@ -41,8 +41,8 @@ PhaseTimes phase_times(const RenderReport& report);
 void print_summary(const RenderReport& report);
 /// The same about a frame of a sequence, in one line; `frame`: "frame 12 (3 of 8)".
 void print_frame(const RenderReport& report, const std::string& frame);
-/// The last lines about a sequence.
-void print_frames(const RenderOptions& options, int n_frames, const PhaseTimes& times);
+/// The last lines about a sequence, of whose frames this command made some.
+void print_frames(const RenderOptions& options, int n_made, int n_frames, const PhaseTimes& times);
 
 // covary render --frames: a scene to numbered images. The scene is loaded and built once or, if it is a pattern of
 // names, once per frame. Each frame is the image that `render` makes of it alone with the same camera and seed,

@@ -144,10 +144,11 @@ void print_frame(const RenderReport& report, const std::string& frame) {
              seconds_text(times.total() - times.loading), report.result.predicted ? "; " + quality_text(report) : "");
 }
 
-void print_frames(const RenderOptions& options, int n_frames, const PhaseTimes& times) {
+void print_frames(const RenderOptions& options, int n_made, int n_frames, const PhaseTimes& times) {
   const std::string& output = options.request().output;
-  fmt::print(stderr, "{}: {} frame{}\ntime: {}\n", output, n_frames, n_frames > 1 ? "s" : "",
-             text_of(times, estimate_name(options)));
+  const std::string made = n_made == n_frames ? fmt::format("{} frame{}", n_frames, n_frames > 1 ? "s" : "")
+                                              : fmt::format("{} of {} frames; the others were there", n_made, n_frames);
+  fmt::print(stderr, "{}: {}\ntime: {}\n", output, made, text_of(times, estimate_name(options)));
   if (n_frames > 1)
     fmt::print(stderr, "next: `covary convert {} {}` makes a video\n", shell_text({output}), "video.mp4");
 }

@@ -53,9 +53,10 @@ std::string quick_crop(const std::string& crop, int64_t most) {
   return fmt::format("{},{},{},{}", window[0] + (window[2] - w) / 2, window[1] + (window[3] - h) / 2, w, h);
 }
 
-void make_quick(const QuickLimits& limits, Suite& suite) {
+/// `chosen`: the scenes were chosen by their names, and all stay.
+void make_quick(const QuickLimits& limits, bool chosen, Suite& suite) {
   if (suite.seeds.size() > limits.seeds) suite.seeds.resize(limits.seeds);
-  if (limits.scenes > 0 && suite.scenes.size() > limits.scenes) suite.scenes.resize(limits.scenes);
+  if (!chosen && limits.scenes > 0 && suite.scenes.size() > limits.scenes) suite.scenes.resize(limits.scenes);
   std::erase_if(suite.budgets, [&](const Budget& b) { return b.spp > limits.spp; });
   if (suite.budgets.empty()) suite.budgets.push_back({limits.spp, 0});
   if (limits.seconds > 0)
@@ -97,9 +98,9 @@ int64_t most_pixels(const Overrides& o) {
 
 void apply(const Overrides& o, Suite& suite) {
   check_sizes(o);
-  if (o.quick) make_quick(*o.quick, suite);
-  if (!o.baseline.empty()) suite.baseline = o.baseline;
   if (!o.scenes.empty()) keep("scene", o.scenes, suite.scenes);
+  if (o.quick) make_quick(*o.quick, !o.scenes.empty(), suite);
+  if (!o.baseline.empty()) suite.baseline = o.baseline;
   keep_methods(o.methods.empty() && o.quick ? o.quick->methods : o.methods, suite);
   if (!o.seeds.empty()) suite.seeds = o.seeds;
   if (!o.budgets.empty()) suite.budgets = o.budgets;

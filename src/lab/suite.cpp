@@ -203,7 +203,7 @@ std::string scenes_folder(const Suite& suite, const std::string& word, const std
 std::string own_scenes_folder(const std::string& program) {
   if (std::string folder = folder_with("scenes", "room.xml", program); !folder.empty()) return folder;
   throw Error(ErrorCode::kUsage,
-              "the scenes of covary are not found; run the command where the folder `scenes` of its "
+              "the scenes of covary are not found; run the command where the folder 'scenes' of its "
               "source tree is");
 }
 

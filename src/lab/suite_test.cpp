@@ -36,6 +36,12 @@ const char* const kSuite = R"({
   "published": {"source": "somewhere", "relmse": {"room": {"pt": {"24": 0.5}}}}
 })";
 
+TEST(Suite, OwnScenesThatAreNotThere) {
+  if (std::filesystem::exists("scenes/room.xml")) GTEST_SKIP() << "they are there";
+  EXPECT_TRUE(contains(message_of([] { own_scenes_folder("/nowhere/at/all/covary"); }),
+                       "run the command where the folder 'scenes' of its source tree is"));
+}
+
 TEST(Suite, ReadsEverything) {
   const Suite suite = parse_suite(kSuite, "small.json");
   EXPECT_EQ(suite.scenes.size(), 2u);

@@ -103,6 +103,26 @@ TEST(Paper, ScenesAndMethodsAreChosenWherePartsHaveThem) {
                        "--only: 'iicv' has no part 'tabel1'; did you mean 'table1'"));
 }
 
+TEST(Paper, QuickTakesAllScenesThatAreNamed) {
+  const TemporaryFolder folder;
+  Overrides overrides;
+  overrides.quick.emplace();
+  std::vector<std::string> files;
+  const Paper paper = builtin_paper("iicv");
+  const std::vector<PreparedPart> without = prepare_parts(paper, {"table1"}, "", "nowhere", {});
+  for (const SceneEntry& scene : without[0].missing) files.push_back(scene.file);
+  ASSERT_EQ(files.size(), 10u);
+  touch(folder.path(), files);
+  const auto scenes = [&] {
+    return names_of(prepare_parts(paper, {"table1"}, folder.path().string(), "nowhere", overrides)[0].suite.scenes);
+  };
+  EXPECT_EQ(scenes().size(), 4u);
+  overrides.scenes = {"teapot"};  // not among these
+  EXPECT_EQ(scenes(), overrides.scenes);
+  overrides.scenes = {"bathroom2", "house", "kitchen", "staircase", "teapot"};
+  EXPECT_EQ(scenes(), overrides.scenes);
+}
+
 TEST(Paper, MistakesAreToldAllAtOnce) {
   const std::string text = R"({"name": "a", "title": "A", "own_scenes": "quick", "parts": [
     {"names": ["x"], "title": "X", "suite": "nothing", "quick": {"seed": 1}},

@@ -52,6 +52,9 @@ class Progress(CliTest):
         text = self.shown(*RENDER, "--spp", "8", "--estimator", "none", "--frames", "2-4", "-o", "f_#.exr")
         self.in_order(text, "frame 2 (1 of 3): samples", "frame 2 (1 of 3): f_2.exr in ", "frame 4 (3 of 3): samples",
                       "f_#.exr: 3 frames", "\ntime: ", "\nnext: `covary convert 'f_#.exr' video.mp4` makes a video")
+        text = self.shown(*RENDER, "--spp", "8", "--estimator", "none", "--frames", "2-5", "-o", "f_#.exr", "--resume")
+        self.in_order(text, "f_4.exr: complete", "f_#.exr: 1 of 4 frames; the others were there",
+                      "\nnext: `covary convert")
 
     def test_the_time_left_counts_on_the_processors_that_are_to_be_had(self):
         """Eight threads on one processor: denoising takes as long by the clock as processor time, and not an eighth."""
