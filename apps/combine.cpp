@@ -41,6 +41,7 @@
 #include "risk_report.h"
 #include "sequences/frame_names.h"
 #include "stages.h"
+#include "usage_error.h"
 #include "value_names.h"
 
 namespace covary {
@@ -261,7 +262,6 @@ void write_stages(const CombineOptions& o, const CombineRequest& request) {
 /// Without a CRN image, the only use is to denoise the independent image's mean. Throws Error(kUsage) otherwise.
 void check_passes(const CombineOptions& o) {
   if (!o.crn.empty()) return;
-  const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   if (o.estimator != kDefaultEstimator)
     usage(fmt::format("--estimator {} needs the image with common random numbers, --crn", o.estimator));
   if (!o.denoising.denoises())

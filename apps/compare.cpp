@@ -27,6 +27,7 @@
 #include "metrics/metrics.h"
 #include "numbers.h"
 #include "picture_options.h"
+#include "usage_error.h"
 #include "value_names.h"
 
 namespace covary {
@@ -196,7 +197,6 @@ void write_error_maps(const CompareOptions& options, const std::vector<Compariso
 }
 
 void check_options(const CompareOptions& options) {
-  const auto usage = [](const std::string& text) { throw Error(ErrorCode::kUsage, text); };
   for (const std::string& name : options.metrics) {
     find_metric(name);
     if (std::count(options.metrics.begin(), options.metrics.end(), name) > 1)

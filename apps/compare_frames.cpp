@@ -19,6 +19,7 @@
 #include "metrics/sequence_errors.h"
 #include "picture_options.h"
 #include "sequences/frame_names.h"
+#include "usage_error.h"
 
 namespace covary {
 namespace {
@@ -210,7 +211,6 @@ std::string formula_text(const CompareOptions& o, const MetricInfo& metric) {
 }
 
 bool compares_frames(const CompareOptions& o) {
-  const auto usage = [](const std::string& text) { throw Error(ErrorCode::kUsage, text); };
   const bool of_frames = is_frame_pattern_of_input(o.images[0]);
   for (const std::string& path : o.images)
     if (is_frame_pattern_of_input(path) != of_frames)

@@ -44,6 +44,7 @@
 #include "progress.h"
 #include "risk_report.h"
 #include "sequences/frame_names.h"
+#include "usage_error.h"
 #include "value_names.h"
 #include "watched_folders.h"
 
@@ -263,7 +264,6 @@ void write(const Options& o, const ImagePlace& place, std::vector<Denoised>& all
 bool is_by_network(const Options& o) { return o.mode == kNetwork || (o.mode.empty() && o.clean_guides); }
 
 void check_options(const Options& o) {
-  const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   if (o.inputs.empty() || o.output.empty()) usage("expected IN.exr and -o OUT.exr, or --check");
   if (o.no_guides && !(o.albedo + o.normal).empty()) usage("--albedo and --normal have no effect with --no-guides");
   if (o.no_guides && o.clean_guides) usage("--clean-guides has no effect with --no-guides");

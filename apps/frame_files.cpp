@@ -21,11 +21,10 @@
 #include "numbers.h"
 #include "sequences/frame_names.h"
 #include "settled_files.h"
+#include "usage_error.h"
 
 namespace covary {
 namespace {
-
-[[noreturn]] void usage(const std::string& message) { throw Error(ErrorCode::kUsage, message); }
 
 MotionSource motion_source(const FrameOptions& o) {
   MotionSource source = o.motion;

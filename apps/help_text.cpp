@@ -46,7 +46,7 @@ std::string option_entry(const OptionDescription& option) {
   // Aligns long names of options without a short name with the others.
   const std::string indent = option.names[0].starts_with("--") ? "    " : "";
   return help_entry(fmt::format("{}{}{}{}", indent, fmt::join(option.names, ", "), value.empty() ? "" : " ", value),
-               option.text);
+                    option.text);
 }
 
 std::string section(const std::string& heading, const std::vector<OptionDescription>& options,
@@ -57,7 +57,7 @@ std::string section(const std::string& heading, const std::vector<OptionDescript
   return text.empty() ? "" : "\n" + heading + ":\n" + text;
 }
 
-std::string usage(const CLI::App& app, const CommandDescription& command, const std::string& name) {
+std::string usage_lines(const CLI::App& app, const CommandDescription& command, const std::string& name) {
   std::string text = "Usage: " + name + " [OPTIONS]";
   for (const CLI::Option* option : app.get_options([](const CLI::Option* o) { return o->get_positional(); })) {
     const std::string argument = option->get_name(true) + (option->get_items_expected_max() > 1 ? "..." : "");
@@ -85,7 +85,7 @@ std::string list_of_commands(const CLI::App& app) {
 
 std::string help_text(const CLI::App& app, const std::string& name, bool all) {
   const CommandDescription command = describe_command(app);
-  std::string text = command.text + "\n" + usage(app, command, name);
+  std::string text = command.text + "\n" + usage_lines(app, command, name);
   text += section("Arguments", command.positionals, "");
   text += section(kBasicOptions, command.options, kBasicOptions);
   std::vector<std::string> others = groups_of(command);

@@ -26,7 +26,7 @@ extern "C" void on_signal(int signal) {
   }
   remove_unfinished_files();
   constexpr const char* kText = "covary: interrupted\n";
-  [[maybe_unused]] const ssize_t nobody_may_read_it = write(STDERR_FILENO, kText, std::strlen(kText));
+  [[maybe_unused]] const ssize_t nobody_may_read_it = ::write(STDERR_FILENO, kText, std::strlen(kText));
   _exit(128 + signal);
 }
 

@@ -41,10 +41,10 @@ struct ProbeOptions {
 
 /// A probe trains but renders no image: refuses options that only affect images, which the help leaves out.
 bool has_effect(const CLI::Option& option) {
-  static constexpr const char* kUsed[] = {"help",    "help-all",      "output",       "integrator",     "resolution",
-                                          "crop",    "seed",          "define",       "ignore-unknown", "threads",
-                                          "quiet",   "no-preview",    "rfilter",      "pixel",          "height",
-                                          "samples", "load-training", "save-training", "set"};
+  static constexpr const char* kUsed[] = {
+      "help",   "help-all",       "output",        "integrator",    "resolution", "crop",    "seed",
+      "define", "ignore-unknown", "threads",       "quiet",         "no-preview", "rfilter", "pixel",
+      "height", "samples",        "load-training", "save-training", "set"};
   if (option.get_positional()) return true;
   for (const std::string& name : option.get_lnames())
     if (std::count(std::begin(kUsed), std::end(kUsed), name) > 0 || find_option(options_of_integrators(), name))
@@ -65,9 +65,9 @@ void check_parameters(const OptionValues& of_estimator) {
                 fmt::format("`{}` has no effect on probes, which render no image", of_estimator.begin()->first));
 }
 
-using Images = std::array<const Image*, 3>;
+using ThreeImages = std::array<const Image*, 3>;
 
-Image side_by_side(const Images& images) {
+Image beside_each_other(const ThreeImages& images) {
   const int width = images[0]->width, height = images[0]->height;
   Image all(3 * width, height, 3);
   for (int i = 0; i < 3; ++i)
@@ -87,7 +87,7 @@ Image exposed(Image image) {
 
 void write_preview(const std::string& path, const GuideProbe& probe) {
   const Image radiance = exposed(probe.radiance), density = exposed(probe.density), control = exposed(probe.control);
-  write_png(path, side_by_side({&radiance, &density, &control}));
+  write_png(path, beside_each_other({&radiance, &density, &control}));
 }
 
 void probe(ProbeOptions options) {
@@ -130,7 +130,7 @@ void probe(ProbeOptions options) {
       learning->probe(*scene.scene, ray, options.height, options.samples, render.request().seed);
   if (!found) throw Error(ErrorCode::kUsage, fmt::format("no surface is visible at pixel {}", options.pixel));
   progress.finish();
-  const Image image = side_by_side({&found->radiance, &found->density, &found->control});
+  const Image image = beside_each_other({&found->radiance, &found->density, &found->control});
   write_image(output, image, {image.width, image.height, {0, 0, image.width, image.height}}, {});
   if (has_preview) write_preview(preview, *found);
   if (render.quiet) return;

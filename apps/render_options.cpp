@@ -22,6 +22,7 @@
 #include "plans/made_of.h"
 #include "render_steps.h"
 #include "stages.h"
+#include "usage_error.h"
 #include "value_names.h"
 
 namespace covary {
@@ -55,7 +56,6 @@ void check_scene_name(const std::string& word) {
 
 void check_options(RenderOptions& options) {
   check_scene_name(options.scene);
-  const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   options.settings = settings_from<RenderSettings>(options.values);
   options.sequence = settings_from<SequenceSettings>(options.of_sequence);
   RenderSettings& settings = options.settings;

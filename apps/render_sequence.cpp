@@ -25,6 +25,7 @@
 #include "plans/pass_files.h"
 #include "sequences/feature_slopes.h"
 #include "sequences/reprojection.h"
+#include "usage_error.h"
 
 namespace covary {
 namespace {
@@ -32,7 +33,6 @@ namespace {
 namespace fs = std::filesystem;
 
 void check(const RenderOptions& options) {
-  const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   const RenderRequest& request = options.request();
   for (const auto& [name, given] :
        {std::pair{"--save-stages", !options.stages.empty()}, {"--save-training", !request.save_training.empty()}})
@@ -43,10 +43,8 @@ void check(const RenderOptions& options) {
   for (const auto& [name, path] :
        {std::pair{"-o", request.output}, {"--passes", request.passes}, {"--json", options.json}})
     if (!path.empty() && !is_frame_pattern(path))
-      usage(
-          fmt::format("{} '{}': with --frames, expected a name with '#' for the frame number, e.g. "
-                      "{}",
-                      name, path, std::string(name) == "-o" ? "out_####.exr" : "out_####"));
+      usage(fmt::format("{} '{}': with --frames, expected a name with '#' for the frame number, e.g. {}", name, path,
+                        std::string(name) == "-o" ? "out_####.exr" : "out_####"));
 }
 
 /// The options of a single frame.

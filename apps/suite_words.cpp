@@ -15,7 +15,7 @@ namespace {
 using Words = std::vector<std::string>;
 
 // Placeholders for the files that an experiment adds to the command.
-constexpr const char *kInput = "the-input-of-the-experiment", *kOutput = "the-output-of-the-experiment";
+constexpr const char *kInputWord = "the-input-of-the-experiment", *kOutputWord = "the-output-of-the-experiment";
 
 /// What a value with this placeholder names outside the suite; null for plain values.
 const char* what_is_named(const std::string& name) {
@@ -65,7 +65,7 @@ std::vector<lab::WordProblem> problems_of(const CLI::App& command, const Words& 
   std::vector<lab::WordProblem> problems;
   for (const CLI::Option* option : command.get_options())
     for (const std::string& value : option->results()) {
-      const bool is_ours = option->check_lname("output") && value == kOutput;
+      const bool is_ours = option->check_lname("output") && value == kOutputWord;
       const char* what = is_ours ? nullptr : named_by(*option, value);
       if (!what) continue;
       const size_t word = word_of(*option, words);
@@ -87,10 +87,10 @@ std::vector<lab::WordProblem> check_suite_command(const Words& command) {
   app.require_subcommand(0, 1);
   add_commands(app);
   app.parse_complete_callback([] { throw Parsed(); });
-  Words words = {command[0], kInput};
+  Words words = {command[0], kInputWord};
   words.insert(words.end(), command.begin() + 1, command.end());
   const bool is_render = command[0] == "render";
-  if (!is_render) words.insert(words.end(), {"-o", kOutput});
+  if (!is_render) words.insert(words.end(), {"-o", kOutputWord});
   std::reverse(words.begin(), words.end());
   std::vector<lab::WordProblem> refused;
   try {

@@ -18,13 +18,12 @@
 #include "core/stopwatch.h"
 #include "film/outputs.h"
 #include "settled_files.h"
+#include "usage_error.h"
 
 namespace covary {
 namespace {
 
 namespace fs = std::filesystem;
-
-[[noreturn]] void usage(const std::string& message) { throw Error(ErrorCode::kUsage, message); }
 
 /// The EXR files of a folder, without hidden ones, which are names of files that are not finished.
 std::set<std::string> images_in(const std::string& folder) {
@@ -41,9 +40,9 @@ std::set<std::string> images_in(const std::string& folder) {
 }
 
 /// Images that appear in folders.
-class Images {
+class FolderImages {
  public:
-  explicit Images(const std::vector<std::string>& folders) : folders_(folders) {}
+  explicit FolderImages(const std::vector<std::string>& folders) : folders_(folders) {}
 
   std::vector<std::string> paths(const std::string& name) const {
     std::vector<std::string> all;
@@ -79,9 +78,9 @@ class Images {
   SettledFiles files_;
 };
 
-bool is_result(const std::string& path) { return is_made_by(path, "denoise"); }
+bool is_denoised_result(const std::string& path) { return is_made_by(path, "denoise"); }
 
-void make_folder(const std::string& path) {
+void make_result_folder(const std::string& path) {
   std::error_code error;
   fs::create_directory(path, error);
   if (error) throw Error(ErrorCode::kIo, fmt::format("-o '{}': the folder cannot be made: {}", path, error.message()));
@@ -113,8 +112,8 @@ bool are_folders(const FrameOptions& o, const std::vector<std::string>& inputs, 
 void for_each_image(
     const FrameOptions& o, const std::vector<std::string>& inputs, const std::string& output,
     const std::function<std::string(const std::vector<std::string>& paths, const std::string& result)>& run) {
-  make_folder(output);
-  Images images(inputs);
+  make_result_folder(output);
+  FolderImages images(inputs);
   size_t n_done = 0, n_kept = 0;
   std::vector<std::string> failed;
   const Stopwatch watch;
@@ -126,7 +125,7 @@ void for_each_image(
     for (const std::string& name : ready) {
       const std::vector<std::string> paths = images.paths(name);
       const std::string result = (fs::path(output) / name).string();
-      if (std::any_of(paths.begin(), paths.end(), is_result)) {
+      if (std::any_of(paths.begin(), paths.end(), is_denoised_result)) {
         fmt::print(stderr, "note: {} is left out: 'covary denoise' made it\n", printable(paths[0]));
       } else if (o.resume && fs::exists(result)) {
         ++n_kept;

@@ -1,14 +1,18 @@
-# covary_module(<name> SOURCES a.cpp ... HEADERS a.h ... DEPENDS module-or-target ... TESTS a_test.cpp ...
-#               TESTS_TOGETHER b_test.cpp ...)
+# covary_module(<name> [TOGETHER] SOURCES a.cpp ... HEADERS a.h ... DEPENDS module-or-target ...
+#               TESTS a_test.cpp ... TESTS_TOGETHER b_test.cpp ...)
 #
 # A module is one folder of src/: a library `covary_<name>` made of SOURCES, which may use only the modules it DEPENDS
 # on (tests/layers checks the includes), and one program `<name>_tests` made of the TESTS that lie beside the code.
-# HEADERS are those for other programs, installed with all that they include (CovaryLibrary.cmake).
+# HEADERS are those for other programs, installed with all that they include (CovaryLibrary.cmake). The SOURCES of a
+# module of many small files are compiled TOGETHER.
 function(covary_module name)
-  cmake_parse_arguments(MODULE "" "" "SOURCES;HEADERS;DEPENDS;TESTS;TESTS_TOGETHER;TEST_DEPENDS" ${ARGN})
+  cmake_parse_arguments(MODULE "TOGETHER" "" "SOURCES;HEADERS;DEPENDS;TESTS;TESTS_TOGETHER;TEST_DEPENDS" ${ARGN})
   if(MODULE_SOURCES)
     add_library(covary_${name} STATIC ${MODULE_SOURCES})
     covary_precompile(covary_${name})
+    if(MODULE_TOGETHER)
+      covary_together(covary_${name})
+    endif()
     set(scope PUBLIC)
   else()
     add_library(covary_${name} INTERFACE)
@@ -25,18 +29,25 @@ function(covary_module name)
   endif()
 endfunction()
 
+# covary_together(<target>): its files are compiled eight at a time, which takes half of the time: what they include is
+# read, and its templates are made, once. So no two of them may define the same name, not even in an anonymous
+# namespace. The presets for development compile every file by itself.
+function(covary_together target)
+  if(NOT CMAKE_DISABLE_PRECOMPILE_HEADERS)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+    # GCC takes every file but the one that it was given for a header.
+    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+  endif()
+endfunction()
+
 # covary_test(<program> SOURCES ... TOGETHER ... DEPENDS ... [LABEL statistical|nightly]): a GoogleTest program, each of
-# its tests known to CTest. Files that are TOGETHER are compiled eight at a time, which takes half of the time: what
-# they include is read, and its templates are made, once. So no two of them may define the same name, not even in an
-# anonymous namespace. The presets for development compile every file by itself.
+# its tests known to CTest. Of its files, those that are TOGETHER are compiled so.
 function(covary_test program)
   cmake_parse_arguments(TEST "" "LABEL" "SOURCES;TOGETHER;DEPENDS" ${ARGN})
   add_executable(${program} ${TEST_SOURCES} ${TEST_TOGETHER})
-  if(TEST_TOGETHER AND NOT CMAKE_DISABLE_PRECOMPILE_HEADERS)
-    set_target_properties(${program} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
-    if(TEST_SOURCES)
-      set_source_files_properties(${TEST_SOURCES} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
-    endif()
+  if(TEST_TOGETHER)
+    covary_together(${program})
+    set_source_files_properties(${TEST_SOURCES} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   endif()
   target_include_directories(${program} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/tests)
   target_link_libraries(${program} PRIVATE ${TEST_DEPENDS} GTest::gtest_main)

@@ -12,26 +12,27 @@ namespace covary {
 namespace {
 
 constexpr float kLeastRoughness = 0.07f;
-constexpr int kMus = 64, kRoughnesses = 32, kSide = 32;
+constexpr int kSheenMus = 64, kSheenRoughnesses = 32, kSheenSide = 32;
 
-float node(int i, int n) { return static_cast<float>(i) / static_cast<float>(n - 1); }
+float sheen_node(int i, int n) { return static_cast<float>(i) / static_cast<float>(n - 1); }
 
 struct Table {
-  std::array<float, kMus * kRoughnesses> values;
+  std::array<float, kSheenMus * kSheenRoughnesses> values;
   Table() {
-    for (int r = 0; r < kRoughnesses; ++r) {
-      const CharlieSheen sheen(node(r, kRoughnesses));
-      for (int m = 0; m < kMus; ++m) {
-        const float mu = std::max(node(m, kMus), 1e-3f);
+    for (int r = 0; r < kSheenRoughnesses; ++r) {
+      const CharlieSheen sheen(sheen_node(r, kSheenRoughnesses));
+      for (int m = 0; m < kSheenMus; ++m) {
+        const float mu = std::max(sheen_node(m, kSheenMus), 1e-3f);
         const Vec3 o{safe_sqrt(1 - mu * mu), 0, mu};
         double sum = 0;
-        for (int k = 0; k < kSide * kSide; ++k) {  // uniform in angles: the lobe lies near the horizon
-          const float theta = (static_cast<float>(k / kSide) + 0.5f) * kPi / 2 / kSide;
-          const float phi = (static_cast<float>(k % kSide) + 0.5f) * kPi / kSide;  // half: it is symmetric
+        for (int k = 0; k < kSheenSide * kSheenSide; ++k) {  // uniform in angles: the lobe lies near the horizon
+          const float theta = (static_cast<float>(k / kSheenSide) + 0.5f) * kPi / 2 / kSheenSide;
+          const float phi = (static_cast<float>(k % kSheenSide) + 0.5f) * kPi / kSheenSide;  // half: it is symmetric
           const Vec3 i{std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
           sum += sheen.eval(o, i, normalize(o + i)) * std::sin(theta);
         }
-        values[m * kRoughnesses + r] = std::min(static_cast<float>(2 * sum * (kPi / 2 / kSide) * (kPi / kSide)), 1.0f);
+        values[m * kSheenRoughnesses + r] =
+            std::min(static_cast<float>(2 * sum * (kPi / 2 / kSheenSide) * (kPi / kSheenSide)), 1.0f);
       }
     }
   }
@@ -60,11 +61,11 @@ float CharlieSheen::eval(const Vec3& o, const Vec3& i, const Vec3& h) const {
 
 float charlie_albedo(float mu, float roughness) {
   static const auto kTable = std::make_unique<const Table>();
-  const float x = clamp01(mu) * (kMus - 1), y = clamp01(roughness) * (kRoughnesses - 1);
-  const int m = std::min(static_cast<int>(x), kMus - 2), r = std::min(static_cast<int>(y), kRoughnesses - 2);
+  const float x = clamp01(mu) * (kSheenMus - 1), y = clamp01(roughness) * (kSheenRoughnesses - 1);
+  const int m = std::min(static_cast<int>(x), kSheenMus - 2), r = std::min(static_cast<int>(y), kSheenRoughnesses - 2);
   const float fx = x - static_cast<float>(m), fy = y - static_cast<float>(r);
-  const float* low = &kTable->values[m * kRoughnesses + r];
-  return lerp(fx, lerp(fy, low[0], low[1]), lerp(fy, low[kRoughnesses], low[kRoughnesses + 1]));
+  const float* low = &kTable->values[m * kSheenRoughnesses + r];
+  return lerp(fx, lerp(fy, low[0], low[1]), lerp(fy, low[kSheenRoughnesses], low[kSheenRoughnesses + 1]));
 }
 
 }  // namespace covary

@@ -136,14 +136,16 @@ class MeasuredClosure final : public BsdfClosure {
 
 /// Directional albedo for `wo`.
 Spectrum reflected(const Material& material, const Vec3& wo) {
-  constexpr int kSide = 16;
+  constexpr int kMeasuredSide = 16;
   const MeasuredClosure closure(material, TransportMode::kRadiance);
   Spectrum sum(0);
-  for (int y = 0; y < kSide; ++y)
-    for (int x = 0; x < kSide; ++x)
-      sum += closure.sample(wo, 0, Vec2{static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f} * (1.0f / kSide))
-                 .weight;
-  return sum / (kSide * kSide);
+  for (int y = 0; y < kMeasuredSide; ++y)
+    for (int x = 0; x < kMeasuredSide; ++x)
+      sum +=
+          closure
+              .sample(wo, 0, Vec2{static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f} * (1.0f / kMeasuredSide))
+              .weight;
+  return sum / (kMeasuredSide * kMeasuredSide);
 }
 
 class Measured final : public Bsdf {

@@ -10,9 +10,9 @@
 #include <map>
 #include <numeric>
 
-#include "core/error.h"
 #include "core/number_text.h"
 #include "film/denoised_by.h"
+#include "film/input_error.h"
 #include "film/pictures.h"
 #include "film/splat_layer.h"
 
@@ -22,10 +22,6 @@ namespace {
 constexpr const char* kGroup = "group";                  // layers group00, group01, … of covary's films
 constexpr const char* kCounts = "samples";               // channel in covary's films
 constexpr const char* kVariance = "variance_in_groups";  // channels .R .G .B in some of them
-
-[[noreturn]] void fail(const std::string& path, const std::string& what) {
-  throw Error(ErrorCode::kInput, path + ": " + what);
-}
 
 std::string attribute(const ExrFile& file, const std::string& key) {
   const auto it = file.attributes().find(key);
@@ -52,7 +48,7 @@ double samples_per_pixel(const ExrFile& file, const std::string& path) {
   if (text.empty()) return 0;
   const double value = parse_real(text).value_or(-1);
   if (!(value >= 0 && value < 1e15))
-    fail(path, fmt::format("attribute {} is '{}'; expected a number of samples per pixel", key, text));
+    fail_input(path, fmt::format("attribute {} is '{}'; expected a number of samples per pixel", key, text));
   return value;
 }
 
@@ -111,11 +107,12 @@ ColourLayer single_layer(const std::string& path, const ExrFile& file, const std
                                    [&](const ExrFile::Channel& c) { return c.name == name; }))
     return {name, {name, name, name}};
   if (!name.empty())
-    fail(path, fmt::format("no image '{}'{}; {}", name, did_you_mean(name, names), list_layers(file, layers)));
+    fail_input(path, fmt::format("no image '{}'{}; {}", name, did_you_mean(name, names), list_layers(file, layers)));
   if (pictures.size() > 1)
-    fail(path, fmt::format("several pictures, {}; choose one by {}--layer", text_of(pictures),
-                           pictures[0].view.empty() ? "" : "--view or "));
-  fail(path, fmt::format("{}; {}",
+    fail_input(path, fmt::format("several pictures, {}; choose one by {}--layer", text_of(pictures),
+                                 pictures[0].view.empty() ? "" : "--view or "));
+  fail_input(path,
+             fmt::format("{}; {}",
                          layers.empty() ? "no image of channels R, G and B" : "several images; choose one by --layer",
                          list_layers(file, layers)));
 }
@@ -143,23 +140,26 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
   if (files_.size() == 1)
     place_ = file.place();
   else if (!(file.colours() == files_[0]->colours()))
-    fail(path, fmt::format("its colours are {}, those of {} {}; renders of one picture have the same colour space",
+    fail_input(path,
+               fmt::format("its colours are {}, those of {} {}; renders of one picture have the same colour space",
                            file.colours().text(), source_.files[0], files_[0]->colours().text()));
   else if (!(file.place() == place_))
-    fail(path, fmt::format("{} x {} pixels at ({}, {}) of a frame of {} x {}; {} has {} x {} at ({}, {}) of {} x {}",
-                           file.place().window.width, file.place().window.height, file.place().window.x,
-                           file.place().window.y, file.place().frame_width, file.place().frame_height, source_.files[0],
-                           place_.window.width, place_.window.height, place_.window.x, place_.window.y,
-                           place_.frame_width, place_.frame_height));
+    fail_input(
+        path,
+        fmt::format("{} x {} pixels at ({}, {}) of a frame of {} x {}; {} has {} x {} at ({}, {}) of {} x {}",
+                    file.place().window.width, file.place().window.height, file.place().window.x, file.place().window.y,
+                    file.place().frame_width, file.place().frame_height, source_.files[0], place_.window.width,
+                    place_.window.height, place_.window.x, place_.window.y, place_.frame_width, place_.frame_height));
 
   const std::vector<ColourLayer> layers = colour_layers(file.channels());
   const std::vector<ColourLayer> numbered = numbered_layers(layers, layer);
   const size_t first_group = groups_.size();
   if (numbered.size() > 1) {
     if (!only_file)
-      fail(path, fmt::format(
-                     "holds {} groups of samples; give it alone, or files of one image each, or --layer for the image",
-                     numbered.size()));
+      fail_input(
+          path,
+          fmt::format("holds {} groups of samples; give it alone, or files of one image each, or --layer for the image",
+                      numbered.size()));
     for (const ColourLayer& group : numbered) {
       groups_.push_back({0, group.channels});
       source_.used.insert(group.channels.begin(), group.channels.end());
@@ -172,7 +172,7 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
   for (size_t g = first_group; g < groups_.size(); ++g)
     for (const std::string& channel : groups_[g].channels) {
       const std::string& type = file.find(channel)->type;
-      if (type == "uint") fail(path, fmt::format("channel {} holds integers; expected float values", channel));
+      if (type == "uint") fail_input(path, fmt::format("channel {} holds integers; expected float values", channel));
       has_half_ |= type == "half";
       read.push_back(channel);
     }
@@ -185,9 +185,9 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
 void GroupedFile::take_film_facts(const std::string& path, const ExrFile& file, bool may_be_film) {
   const double samples = samples_per_pixel(file, path);
   if (files_.size() > 1 && samples != samples_of_group_)
-    fail(path, fmt::format("has {} samples per pixel, {} {}; render all with the same number ({})", samples,
-                           source_.files[files_.size() - 2], samples_of_group_,
-                           where_to_set(RenderSetting::kSamples, renderer())));
+    fail_input(path, fmt::format("has {} samples per pixel, {} {}; render all with the same number ({})", samples,
+                                 source_.files[files_.size() - 2], samples_of_group_,
+                                 where_to_set(RenderSetting::kSamples, renderer())));
   samples_of_group_ = samples;
   samples_ += samples;
   const ExrFile::Channel* counts = file.find(kCounts);
@@ -201,7 +201,7 @@ void GroupedFile::take_film_facts(const std::string& path, const ExrFile& file, 
   const auto agree = [&](const char* key, std::string& value) {
     const std::string here = attribute(file, std::string("covary:") + key);
     if (files_.size() > 1 && here != value)
-      fail(path, fmt::format("{} is '{}', in {} '{}'", key, here, source_.files[0], value));
+      fail_input(path, fmt::format("{} is '{}', in {} '{}'", key, here, source_.files[0], value));
     value = here;
   };
   agree("sampling", sampling_);
@@ -212,16 +212,17 @@ void GroupedFile::take_film_facts(const std::string& path, const ExrFile& file, 
 }
 
 void GroupedFile::take_counts(const std::string& path) {
-  if (has_counts()) fail(name_, "already says how many samples its pixels have; '" + path + "' is not needed");
+  if (has_counts()) fail_input(name_, "already says how many samples its pixels have; '" + path + "' is not needed");
   auto file = std::make_unique<ExrFile>(path);
   if (!(file->place() == place_)) {
     const CropWindow &there = file->place().window, &here = place_.window;
-    fail(path, fmt::format("{} x {} pixels at ({}, {}); {} has {} x {} at ({}, {})", there.width, there.height, there.x,
-                           there.y, name_, here.width, here.height, here.x, here.y));
+    fail_input(path, fmt::format("{} x {} pixels at ({}, {}); {} has {} x {} at ({}, {})", there.width, there.height,
+                                 there.x, there.y, name_, here.width, here.height, here.x, here.y));
   }
   const bool is_only = file->channels().size() == 1;
   if (!is_only && !file->find(kCounts))
-    fail(path, fmt::format("expected one channel, or one that is named '{}'; {}", kCounts, list_layers(*file, {})));
+    fail_input(path,
+               fmt::format("expected one channel, or one that is named '{}'; {}", kCounts, list_layers(*file, {})));
   counts_channel_ = is_only ? file->channels()[0].name : kCounts;
   file->check({&counts_channel_, 1});
   counts_file_ = std::move(file);
@@ -255,8 +256,9 @@ void GroupedFile::read_counts(int first_row, int n_rows, std::vector<uint32_t>& 
   counts_file_->read_rows({&plane, 1}, first_row, n_rows);
   for (size_t i = 0; i < n_pixels; ++i) {
     if (!(values[i] >= 0 && values[i] <= 0x1p30f && values[i] == std::floor(values[i])))
-      fail(counts_path_, fmt::format("{} at ({}, {}); expected whole numbers of samples", values[i],
-                                     i % static_cast<size_t>(width()), first_row + i / static_cast<size_t>(width())));
+      fail_input(counts_path_,
+                 fmt::format("{} at ({}, {}); expected whole numbers of samples", values[i],
+                             i % static_cast<size_t>(width()), first_row + i / static_cast<size_t>(width())));
     counts[i] = static_cast<uint32_t>(values[i]);
   }
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "combine/grey.h"
 #include "core/error.h"
 #include "film/groups.h"
 #include "filters/planes.h"
@@ -21,11 +22,9 @@ using Severity = Finding::Severity;
 constexpr double kMaxIndependentCorrelation = 0.05;
 constexpr double kMinCrnCorrelation = 0.02;
 constexpr double kMaxSigmas = 8;  // for t with about 11 degrees of freedom: false-alarm rate below 1e-5
-constexpr long kMaxPairs = 250000;
+constexpr long kMaxPixelPairs = 250000;
 constexpr long kFewPairs = 200;
 constexpr double kMostLeftOut = 0.01;  // of the pixels
-
-float grey(const float* rgb) { return (rgb[0] + rgb[1] + rgb[2]) * (1.0f / 3.0f); }
 
 /// Ranks 0 … T-1 of the grey group values of a pixel, ties averaged, minus their mean; false if all values are equal.
 bool centred_ranks(const GroupedImage& image, int x, int y, std::vector<float>& values, std::vector<float>& ranks) {
@@ -54,7 +53,7 @@ class PairStatistics {
         dx_(dx),
         dy_(dy),
         // An odd step, so that patterns of even period are not always sampled at the same phase.
-        step_(std::max(1L, n_pixels / kMaxPairs) | 1),
+        step_(std::max(1L, n_pixels / kMaxPixelPairs) | 1),
         values_(T_),
         first_(T_),
         second_(T_) {}

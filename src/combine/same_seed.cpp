@@ -8,6 +8,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "combine/grey.h"
+
 namespace covary {
 namespace {
 
@@ -25,8 +27,6 @@ constexpr long kFewestSquares = 100;
 constexpr double kLeastPart = 0.25;
 /// The fraction of them that may differ between groups of one seed: rounding sends a few paths elsewhere.
 constexpr double kMostDiffer = 0.05;
-
-float grey(const float* rgb) { return (rgb[0] + rgb[1] + rgb[2]) * (1.0f / 3.0f); }
 
 /// D of the square whose corner is (x, y), in group t. Sets `varied` if it is not exactly 0.
 float detail(const GroupedImage& image, int x, int y, int t, bool& varied) {

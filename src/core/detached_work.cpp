@@ -17,7 +17,7 @@
 namespace covary {
 namespace {
 
-constexpr std::chrono::milliseconds kPoll{20};
+constexpr std::chrono::milliseconds kStopPoll{20};
 
 /// Set once, by the job's thread, when the job is done.
 class Ending {
@@ -34,7 +34,7 @@ class Ending {
   /// Throws Stopped if the surrounding work is stopped first.
   void wait() {
     std::unique_lock lock(mutex_);
-    while (!changed_.wait_for(lock, kPoll, [this] { return ended_; })) throw_if_stopped();
+    while (!changed_.wait_for(lock, kStopPoll, [this] { return ended_; })) throw_if_stopped();
   }
   void rethrow() const {  // after wait()
     if (error_) std::rethrow_exception(error_);

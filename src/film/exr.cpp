@@ -22,15 +22,12 @@
 
 #include "core/parallel.h"
 #include "film/exr_library.h"
+#include "film/input_error.h"
 #include "film/luminance_chroma.h"
 #include "imageio/exr_image.h"
 
 namespace covary {
 namespace {
-
-[[noreturn]] void fail(const std::string& path, const std::string& what) {
-  throw Error(ErrorCode::kInput, path + ": " + what);
-}
 
 std::string compression_name(Imf::Compression compression) {
   constexpr const char* kNames[] = {"none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"};
@@ -56,8 +53,8 @@ ImagePlace place_of(const std::string& path, const Imf::Header& header) {
   const int64_t frame_width = extent(display.min.x, display.max.x), frame_height = extent(display.min.y, display.max.y);
   if (std::min({width, height, frame_width, frame_height}) < 1 ||
       std::max({width, height, frame_width, frame_height}) > kMaxExrSize)
-    fail(path, fmt::format("{} x {} pixels in a frame of {} x {}; expected 1 to {} in each direction", width, height,
-                           frame_width, frame_height, kMaxExrSize));
+    fail_input(path, fmt::format("{} x {} pixels in a frame of {} x {}; expected 1 to {} in each direction", width,
+                                 height, frame_width, frame_height, kMaxExrSize));
   ImagePlace place{static_cast<int>(frame_width), static_cast<int>(frame_height), {}};
   place.window = {window.min.x - display.min.x, window.min.y - display.min.y, static_cast<int>(width),
                   static_cast<int>(height)};
@@ -100,8 +97,6 @@ void assign_views(const Imf::Header& header, std::vector<ExrFile::Channel>& chan
     if (!found.empty() && channel.view.empty() && channel.name.find('.') == std::string::npos) channel.view = views[0];
 }
 
-const char* type_name(ExrPlane::Type type) { return type == ExrPlane::Type::kUint ? "uint" : "float"; }
-
 }  // namespace
 
 struct ExrFile::Handle {
@@ -122,12 +117,12 @@ ExrFile::~ExrFile() = default;
 ExrFile::ExrFile(const std::string& path, ChecksumPolicy checksums, bool unreadable_too) : path_(path) {
   prepare_exr_library();
   // OpenEXR's own messages do not distinguish a missing file from a damaged one.
-  if (!is_exr(path)) fail(path, "not an EXR file");
+  if (!is_exr(path)) fail_input(path, "not an EXR file");
   check_exr_header(path);
   try {
     handle_ = std::make_unique<Handle>(path);
   } catch (const std::exception& error) {
-    fail(path, fmt::format("damaged EXR file: {}", error.what()));
+    fail_input(path, fmt::format("damaged EXR file: {}", error.what()));
   }
 
   std::vector<int> parts(static_cast<size_t>(handle_->file.parts()));
@@ -139,10 +134,11 @@ ExrFile::ExrFile(const std::string& path, ChecksumPolicy checksums, bool unreada
       channels_.push_back({name, "half", ""}), handle_->parts[name] = {kNoPart, name};
   }
   if (channels_.empty() && !(unreadable_too && !unreadable_.empty()))
-    fail(path, unreadable_.empty() ? "an EXR file without channels"
-                                   : fmt::format("no channels that can be read: {} ({}); render or flatten it with one "
-                                                 "value per pixel and channel",
-                                                 unreadable_[0].name, unreadable_[0].type));
+    fail_input(path, unreadable_.empty()
+                         ? "an EXR file without channels"
+                         : fmt::format("no channels that can be read: {} ({}); render or flatten it with one "
+                                       "value per pixel and channel",
+                                       unreadable_[0].name, unreadable_[0].type));
   assign_views(handle_->file.header(0), channels_);
   colours_ = colour_space_of(handle_->file.header(0), attributes_);
   check_pixels();
@@ -196,8 +192,8 @@ void ExrFile::add_attributes(int part, ChecksumPolicy checksums) {
     if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&it.attribute()))
       attributes_.emplace(it.name(), text->value());
     else if (it.name() == std::string(kChecksums) && checksums == ChecksumPolicy::kCheck)
-      fail(path_, fmt::format("damaged: the attribute {} is of the type '{}', not 'string'", kChecksums,
-                              it.attribute().typeName()));
+      fail_input(path_, fmt::format("damaged: the attribute {} is of the type '{}', not 'string'", kChecksums,
+                                    it.attribute().typeName()));
   }
 }
 
@@ -207,7 +203,8 @@ void ExrFile::check_header() {
   if (const uint32_t found = crc_of_header(shape_text(), attributes_); found != checksums_->header)
     fail_checksum(path_, "the header is one", found, checksums_->header);
   if (checksums_->channels.size() != channels_.size())
-    fail(path_, fmt::format("damaged: {} channels and {} checksums", channels_.size(), checksums_->channels.size()));
+    fail_input(path_,
+               fmt::format("damaged: {} channels and {} checksums", channels_.size(), checksums_->channels.size()));
 }
 
 std::string ExrFile::shape_text() const {
@@ -264,9 +261,10 @@ void ExrFile::check_pixels() const {
   std::error_code ignored;
   const double file_bytes = static_cast<double>(std::filesystem::file_size(path_, ignored));
   if (memory > all_memory || least_bytes > file_bytes)
-    fail(path_, fmt::format("the header says {} x {} pixels of {} channels, more than a file of {:.0f} bytes with "
-                            "compression '{}' or the memory can hold",
-                            place_.window.width, place_.window.height, file_values, file_bytes, compression_));
+    fail_input(path_,
+               fmt::format("the header says {} x {} pixels of {} channels, more than a file of {:.0f} bytes with "
+                           "compression '{}' or the memory can hold",
+                           place_.window.width, place_.window.height, file_values, file_bytes, compression_));
 }
 
 const ExrFile::Channel* ExrFile::find(const std::string& name) const {
@@ -283,7 +281,7 @@ void ExrFile::read(std::span<const ExrPlane> planes) const {
                [&](size_t i) { sums[i] = crc_of_values(0, planes[i].base, n_pixels, planes[i].pixel_stride); });
   std::vector<std::string> converted;
   for (size_t i = 0; i < planes.size(); ++i) {
-    if (find(planes[i].name)->type == type_name(planes[i].type))
+    if (find(planes[i].name)->type == exr_type_name(exr_pixel_type(planes[i])))
       check_channel(planes[i].name, sums[i]);
     else
       converted.push_back(planes[i].name);
@@ -320,7 +318,7 @@ void ExrFile::read_rows(std::span<const ExrPlane> planes, int first_row, int n_r
       input.readPixels(rows.min.y, rows.max.y);
     }
   } catch (const std::exception& error) {
-    fail(path_, fmt::format("damaged or incomplete EXR file: {}", error.what()));
+    fail_input(path_, fmt::format("damaged or incomplete EXR file: {}", error.what()));
   }
 }
 

@@ -18,8 +18,6 @@
 namespace covary {
 namespace {
 
-const char* type_name(ExrPlane::Type type) { return type == ExrPlane::Type::kUint ? "uint" : "float"; }
-
 Checksums checksums_of(const ImagePlace& place, const std::map<std::string, std::string>& attributes,
                        std::span<const ExrPlane> planes) {
   std::map<std::string, const ExrPlane*> by_name;
@@ -28,7 +26,7 @@ Checksums checksums_of(const ImagePlace& place, const std::map<std::string, std:
   std::vector<std::string> names;
   for (const auto& [name, plane] : by_name) {
     sorted.push_back(plane);
-    names.push_back(name + " " + type_name(plane->type));
+    names.push_back(name + " " + exr_type_name(exr_pixel_type(*plane)));
   }
   Checksums sums{crc_of_header(exr_shape_text(place, names), attributes), std::vector<uint32_t>(sorted.size())};
   const size_t n_pixels = static_cast<size_t>(place.window.width) * static_cast<size_t>(place.window.height);

@@ -9,6 +9,7 @@
 #include "core/number_text.h"
 #include "film/exr.h"
 #include "film/image_file.h"
+#include "film/input_error.h"
 
 namespace covary {
 namespace {
@@ -65,10 +66,6 @@ std::vector<ExrPlane> film_planes(Film& film, Image& means) {
   return planes;
 }
 
-[[noreturn]] void fail(const std::string& path, const std::string& what) {
-  throw Error(ErrorCode::kInput, path + ": " + what);
-}
-
 /// The layer a channel belongs to: "Albedo" for "Albedo.R", "" for "R".
 std::string layer_of(const std::string& channel) {
   const size_t dot = channel.rfind('.');
@@ -93,9 +90,9 @@ std::map<std::string, std::string> film_attributes(const ExrFile& file, const st
   std::map<std::string, std::string> attributes;
   for (const auto& [name, value] : file.attributes())
     if (name.starts_with(kPrefix)) attributes[name.substr(std::string(kPrefix).size())] = value;
-  if (!attributes.count(kFormat)) fail(path, "not a film of covary (attribute covary:film is missing)");
+  if (!attributes.count(kFormat)) fail_input(path, "not a film of covary (attribute covary:film is missing)");
   if (attributes[kFormat] != kFormatVersion)
-    fail(path, fmt::format("film format '{}'; this version reads '{}'", attributes[kFormat], kFormatVersion));
+    fail_input(path, fmt::format("film format '{}'; this version reads '{}'", attributes[kFormat], kFormatVersion));
   return attributes;
 }
 
@@ -147,10 +144,10 @@ Film read_film(const std::string& path) {
   const std::string text = attributes[kGroups];
   const int groups = parse_number<int>(text).value_or(0);
   if (groups < 1 || groups > Film::kMaxGroups)
-    fail(path, fmt::format("attribute covary:groups is '{}'; expected 1 to {}", text, Film::kMaxGroups));
+    fail_input(path, fmt::format("attribute covary:groups is '{}'; expected 1 to {}", text, Film::kMaxGroups));
   // Before allocating: all channels must exist, with the right type.
   if (!file.find(group_name(groups - 1) + ".R") && groups > 1)
-    fail(path, fmt::format("channel {}.R of a film with {} groups is missing", group_name(groups - 1), groups));
+    fail_input(path, fmt::format("channel {}.R of a film with {} groups is missing", group_name(groups - 1), groups));
 
   require_image_memory(path, file.place().window.width, file.place().window.height,
                        static_cast<double>(file.channels().size() * sizeof(float)));
@@ -158,7 +155,7 @@ Film read_film(const std::string& path) {
   try {
     film = Film(file.place().frame_width, file.place().frame_height, file.place().window, groups);
   } catch (const Error& error) {
-    fail(path, error.what());
+    fail_input(path, error.what());
   }
   for (const auto& [key, value] : attributes)
     if (!is_derived(key)) film.attributes[key] = value;
@@ -171,15 +168,15 @@ Film read_film(const std::string& path) {
   const std::vector<ExrPlane> planes = film_planes(film, means);
   for (const ExrPlane& plane : planes) {
     const ExrFile::Channel* found = file.find(plane.name);
-    if (!found) fail(path, fmt::format("channel {} of a film with {} groups is missing", plane.name, groups));
+    if (!found) fail_input(path, fmt::format("channel {} of a film with {} groups is missing", plane.name, groups));
     const char* expected = plane.type == ExrPlane::Type::kUint ? "uint" : "float";
     if (found->type != expected)
-      fail(path, fmt::format("channel {} is of type {}; expected {}", plane.name, found->type, expected));
+      fail_input(path, fmt::format("channel {} is of type {}; expected {}", plane.name, found->type, expected));
   }
   for (const ExrFile::Channel& channel : file.channels())
     if (layer_of(channel.name) != kStdError &&
         std::none_of(planes.begin(), planes.end(), [&](const ExrPlane& p) { return p.name == channel.name; }))
-      fail(path, fmt::format("channel {} does not belong to a film with {} groups", channel.name, groups));
+      fail_input(path, fmt::format("channel {} does not belong to a film with {} groups", channel.name, groups));
   file.read(planes);
   return film;
 }

@@ -13,16 +13,13 @@
 #include <utility>
 
 #include "core/memory_limit.h"
+#include "film/input_error.h"
 #include "film/pictures.h"
 #include "imageio/exr_image.h"
 #include "imageio/image_io.h"
 
 namespace covary {
 namespace {
-
-[[noreturn]] void fail(const std::string& path, const std::string& what) {
-  throw Error(ErrorCode::kInput, path + ": " + what);
-}
 
 std::string lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
@@ -101,7 +98,7 @@ constexpr double kImageBytes = 3 * sizeof(float);  // per pixel
 bool is_exr_image(const std::string& path) {
   if (is_exr(path)) return true;
   std::error_code ignored;
-  if (std::filesystem::file_size(path, ignored) == 0) fail(path, "the file is empty");
+  if (std::filesystem::file_size(path, ignored) == 0) fail_input(path, "the file is empty");
   return false;
 }
 
@@ -114,7 +111,7 @@ std::vector<std::string> layer_channels(const std::string& path, const std::vect
                                         const std::string& layer) {
   std::vector<std::string> names = find_layer(channels, layer);
   if (!names.empty() && names[0] == names[2] && !channels_that_end(channels, layer, {"y", "ry", "by"}).empty())
-    fail(path, "luminance and chroma (channels Y, RY, BY); expected R, G and B");
+    fail_input(path, "luminance and chroma (channels Y, RY, BY); expected R, G and B");
   if (!names.empty()) return names;
   const std::vector<Layer> layers = find_layers(channels);
   if (layer.empty() && layers.size() == 1) return layers[0].channels;
@@ -130,18 +127,18 @@ std::vector<std::string> layer_channels(const std::string& path, const std::vect
   if (channels.size() > kMostNamed) all += " …";
   const std::string have = fmt::format("layers: {}; channels: {}", known.empty() ? "none" : known, all);
   if (layer.empty() && pictures.size() > 1)
-    fail(path, fmt::format("several pictures, {}; choose one by {}--layer", text_of(pictures),
-                           pictures[0].view.empty() ? "" : "--view or "));
+    fail_input(path, fmt::format("several pictures, {}; choose one by {}--layer", text_of(pictures),
+                                 pictures[0].view.empty() ? "" : "--view or "));
   if (layer.empty() && known.empty() && !channels.empty())
-    fail(path, fmt::format("no channels R G B; choose a channel by --layer, such as '{}' (channels: {})",
-                           channels[0].name, all));
-  if (layer.empty()) fail(path, "no channels R G B; choose a layer (" + have + ")");
+    fail_input(path, fmt::format("no channels R G B; choose a channel by --layer, such as '{}' (channels: {})",
+                                 channels[0].name, all));
+  if (layer.empty()) fail_input(path, "no channels R G B; choose a layer (" + have + ")");
   std::vector<std::string> candidates;
   for (const Layer& known_layer : layers)
     if (!known_layer.name.empty()) candidates.push_back(known_layer.name);
   for (const ExrFile::Channel& c : channels)
     if (c.name.size() > 1 && c.name.find('.') == std::string::npos) candidates.push_back(c.name);
-  fail(path, fmt::format("no layer '{}'{} ({})", layer, did_you_mean(layer, candidates), have));
+  fail_input(path, fmt::format("no layer '{}'{} ({})", layer, did_you_mean(layer, candidates), have));
 }
 
 ImageInfo info_of(const ImageHeader& header) {

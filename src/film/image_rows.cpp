@@ -11,7 +11,7 @@
 namespace covary {
 namespace {
 
-constexpr double kImageBytes = 3 * sizeof(float);  // per pixel
+constexpr double kRowBytes = 3 * sizeof(float);  // per pixel
 
 /// Copies channels `sources` of pixels with `n_channels` values, decoding each value.
 template <typename T, typename Decode>
@@ -86,7 +86,7 @@ Image ImageRows::read_other(int first_row, int n_rows) {
     sources[c] = std::find(header.channels.begin(), header.channels.end(), names_[c]) - header.channels.begin();
   const bool is_bytes = header.type == "uint8";
   require_image_memory(path_, header.width, n_rows,
-                       kImageBytes + static_cast<double>(n_channels * (is_bytes ? 1 : sizeof(float))));
+                       kRowBytes + static_cast<double>(n_channels * (is_bytes ? 1 : sizeof(float))));
   const auto last = static_cast<int>(n_channels);
   Image image;
   if (is_bytes) {

@@ -14,7 +14,7 @@ struct Settings {
   std::array<std::string_view, 4> where;  ///< in the order of RenderSetting
 };
 
-constexpr std::array<Settings, 5> kAll = {{
+constexpr std::array<Settings, 5> kPrograms = {{
     {Renderer::kBlender,
      "Blender",
      {"scene.cycles.seed", "scene.cycles.use_denoising = False",
@@ -55,7 +55,7 @@ Renderer written_by(const std::map<std::string, std::string>& attributes) {
 
 std::string where_to_set(RenderSetting setting, Renderer renderer) {
   std::string all;
-  for (const Settings& of : kAll) {
+  for (const Settings& of : kPrograms) {
     if (of.renderer == renderer) return text_of(of, setting);
     if (of.renderer != Renderer::kCovary) all += (all.empty() ? "" : ", ") + text_of(of, setting);
   }

@@ -49,7 +49,7 @@ const char* instead_of_unknown(std::string_view kind) {
 }
 
 /// Sensors that measure something else than a picture.
-bool makes_no_picture(const ObjectDescription& description) {
+bool is_no_camera(const ObjectDescription& description) {
   return description.kind == "sensor" && (description.type == "distant" || description.type == "irradiancemeter" ||
                                           description.type == "radiancemeter" || description.type == "batch");
 }
@@ -102,7 +102,7 @@ void report_unknown_type(const ObjectDescription& description, std::vector<std::
   for (const std::string& name : supported) list += (list.empty() ? "'" : ", '") + name + "'";
   const std::string name = fmt::format("{} '{}'", description.kind, description.type);
   if (const std::string other = advice(description);
-      !other.empty() && (!diagnostics.ignores_unknown() || makes_no_picture(description))) {
+      !other.empty() && (!diagnostics.ignores_unknown() || is_no_camera(description))) {
     diagnostics.error(description.where, fmt::format("{} is not supported: {}. Supported: {}", name, other, list));
     return;
   }
@@ -154,7 +154,7 @@ std::shared_ptr<const SceneObject> SceneFactory::create(const ObjectDescription&
 
 std::shared_ptr<const SceneObject> SceneFactory::create_instead(const ObjectDescription& unknown) {
   const char* const type = instead_of_unknown(unknown.kind);
-  if (!diagnostics_.ignores_unknown() || !*type || makes_no_picture(unknown)) return nullptr;
+  if (!diagnostics_.ignores_unknown() || !*type || is_no_camera(unknown)) return nullptr;
   ObjectDescription known = unknown;
   known.type = type;
   // Parameters of an unknown material mean something else: it is the default of the known one.

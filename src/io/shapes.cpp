@@ -32,7 +32,7 @@
 namespace covary {
 namespace {
 
-constexpr float kHuge = std::numeric_limits<float>::max();
+constexpr float kLargestRadius = std::numeric_limits<float>::max();
 
 MeshPlacement placement_of(Parameters& p) {
   MeshPlacement placement;
@@ -126,7 +126,7 @@ std::shared_ptr<Shape> make_cube(Parameters& p) {
 
 std::shared_ptr<Shape> make_sphere(Parameters& p) {
   const Vec3 center = p.get_vec3("center", {0, 0, 0});
-  const float radius = p.get_float("radius", 1, 0, kHuge);
+  const float radius = p.get_float("radius", 1, 0, kLargestRadius);
   if (radius == 0) throw Error(ErrorCode::kInput, "the radius is 0; it must be positive");
   return std::make_shared<Sphere>(p.get_transform("to_world"), center, radius, p.get_bool("flip_normals", false));
 }
@@ -137,7 +137,7 @@ std::shared_ptr<Shape> make_disk(Parameters& p) {
 
 std::shared_ptr<Shape> make_cylinder(Parameters& p) {
   const Vec3 p0 = p.get_vec3("p0", {0, 0, 0}), p1 = p.get_vec3("p1", {0, 0, 1});
-  const float radius = p.get_float("radius", 1, 0, kHuge);
+  const float radius = p.get_float("radius", 1, 0, kLargestRadius);
   if (radius == 0) throw Error(ErrorCode::kInput, "the radius is 0; it must be positive");
   if (p0 == p1) throw Error(ErrorCode::kInput, "p0 and p1 are the same point");
   return std::make_shared<Cylinder>(p.get_transform("to_world"), p0, p1, radius, p.get_bool("flip_normals", false));

@@ -7,14 +7,13 @@
 #include <cmath>
 #include <vector>
 
+#include "lab/json_values.h"
 #include "lab/statistics.h"
 
 namespace covary::lab {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json value_of(const Estimate& e) {
   if (!std::isfinite(e.value)) return nullptr;
@@ -99,8 +98,8 @@ Json error_series(const Results& results, size_t scene, X&& x, Use&& use) {
       line["x"].push_back(x(*cell));
       line["y"].push_back(error.value);
       // A logarithmic axis cannot reach zero.
-      line["low"].push_back(number(std::max(error.low, 0.1 * error.value)));
-      line["high"].push_back(number(error.high));
+      line["low"].push_back(json_number(std::max(error.low, 0.1 * error.value)));
+      line["high"].push_back(json_number(error.high));
     }
     if (!line["x"].empty()) series.push_back(std::move(line));
   }
@@ -139,12 +138,12 @@ Json summary_table(const Results& results, size_t budget) {
     published = published || std::isfinite(s.published_ratio);
     rows.push_back({{"method", results.suite.methods[s.method].name},
                     {"n", fmt::format("{}", s.n_scenes)},
-                    {"spp", number(s.samples_per_pixel)},
-                    {"relmse", number(s.relmse)},
-                    {"flip", number(s.flip)},
+                    {"spp", json_number(s.samples_per_pixel)},
+                    {"relmse", json_number(s.relmse)},
+                    {"flip", json_number(s.flip)},
                     {"sample", value_of(s.equal_sample)},
                     {"time", value_of(s.equal_time)},
-                    {"published", number(s.published_ratio)},
+                    {"published", json_number(s.published_ratio)},
                     {"unusable", names_of(results, s.unusable)}});
     unusable = unusable || !s.unusable.empty();
   }
@@ -188,8 +187,8 @@ Json published_table(const Results& results, size_t budget) {
       [](const Cell& cell, Json& row) {
         const Estimate& error = cell.split.relative.error;
         row["ours"] = value_of(error);
-        row["published"] = number(cell.published_relmse);
-        row["ratio"] = number(error.value / cell.published_relmse);
+        row["published"] = json_number(cell.published_relmse);
+        row["ratio"] = json_number(error.value / cell.published_relmse);
       },
       [](const Cell& cell) { return std::isfinite(cell.published_relmse); });
   return table(fmt::format("relMSE, {}; ratio: ours / published", results.suite.budgets[budget].label()), columns,
@@ -209,7 +208,7 @@ Json ratio_table(const Results& results, size_t budget) {
   Json rows = cell_rows(results, budget, [](const Cell& cell, Json& row) {
     row["spp"] = cell.samples_per_pixel;
     row["sample"] = value_of(cell.equal_sample);
-    row["published"] = number(cell.published_ratio);
+    row["published"] = json_number(cell.published_ratio);
     row["time"] = value_of(cell.equal_time);
     row["efficiency"] = value_of(cell.efficiency);
   });
@@ -239,17 +238,17 @@ Json quality_table(const Results& results, size_t budget) {
     const SplitError& split = cell.split.relative;
     row["relmse"] = value_of(split.error);
     row["bias"] = value_of(split.squared_bias);
-    row["share"] = number(split.squared_bias.value / split.error.value);
+    row["share"] = json_number(split.squared_bias.value / split.error.value);
     row["variance"] = value_of(split.variance);
     row["mean"] = value_of(cell.split.mean_ratio);
     row["trimmed"] = value_of(cell.relmse_trimmed);
     row["mae"] = value_of(cell.mae);
     row["flip"] = value_of(cell.flip);
-    row["above5"] = number(cell.above5.value);
+    row["above5"] = json_number(cell.above5.value);
     row["predicted"] = value_of(cell.predicted_over_true);
-    row["coverage"] = number(cell.coverage.value);
-    row["bounded"] = number(cell.bounded);
-    row["hold"] = number(cell.bounds_hold);
+    row["coverage"] = json_number(cell.coverage.value);
+    row["bounded"] = json_number(cell.bounded);
+    row["hold"] = json_number(cell.bounds_hold);
   });
   return table("Errors divided, " + results.suite.budgets[budget].label(), columns, rows);
 }
@@ -266,14 +265,14 @@ Json time_table(const Results& results, size_t budget) {
   if (results.suite.budgets[budget].seconds > 0) columns.push_back(column("ratio", "Of the budget", "percent"));
   Json rows = cell_rows(results, budget, [](const Cell& cell, Json& row) {
     row["spp"] = cell.samples_per_pixel;
-    row["load"] = number(cell.load_seconds.value);
+    row["load"] = json_number(cell.load_seconds.value);
     row["render"] = value_of(cell.render_seconds);
     row["estimate"] = value_of(cell.estimate_seconds);
     row["then"] = value_of(cell.then_seconds);
     row["method_seconds"] = value_of(cell.method_seconds);
     row["processor"] = value_of(cell.processor_seconds);
     row["memory"] = cell.peak_memory_bytes;
-    row["ratio"] = number(cell.time_ratio);
+    row["ratio"] = json_number(cell.time_ratio);
   });
   return table("Seconds, " + results.suite.budgets[budget].label(), columns, rows);
 }
@@ -325,10 +324,10 @@ Json frames_table(const Results& results, size_t budget) {
         row["gain"] = value_of(cell.temporal_gain);
         row["flip"] = value_of(cell.temporal_flip);
         if (!cell.worst) return;
-        row["worst_relmse"] = number(cell.worst->relmse.ratio);
-        row["worst_temporal"] = number(cell.worst->temporal.ratio);
-        row["frame_relmse"] = number(cell.worst->relmse_of_frame.ratio);
-        row["frame_temporal"] = number(cell.worst->temporal_of_frame.ratio);
+        row["worst_relmse"] = json_number(cell.worst->relmse.ratio);
+        row["worst_temporal"] = json_number(cell.worst->temporal.ratio);
+        row["frame_relmse"] = json_number(cell.worst->relmse_of_frame.ratio);
+        row["frame_temporal"] = json_number(cell.worst->temporal_of_frame.ratio);
       },
       [](const Cell& cell) { return !cell.frames.empty(); });
   return table(fmt::format("Changes from frame to frame, {}; gain: error of {} / error of the method; worst region: "
@@ -387,8 +386,8 @@ Json front_plot(const Results& results, size_t budget) {
     series.push_back({{"name", suite.methods[m].name},
                       {"x", {error}},
                       {"y", {share}},
-                      {"low", {number(share - width)}},
-                      {"high", {number(share + width)}},
+                      {"low", {json_number(share - width)}},
+                      {"high", {json_number(share + width)}},
                       {"style", "points"}});
     alt += fmt::format("{}{}: {:.3g}, {:.0f} %", alt.empty() ? "" : "; ", suite.methods[m].name, error, 100 * share);
   }

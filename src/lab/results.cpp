@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/results.h"
+#include "lab/json_values.h"
 
 #include <fmt/format.h>
 #include <sys/utsname.h>
@@ -15,14 +16,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// JSON has no NaN: null.
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 Json json_of(const Estimate& e) {
-  return {{"value", number(e.value)},
-          {"standard_error", number(e.standard_error)},
-          {"low", number(e.low)},
-          {"high", number(e.high)}};
+  return {{"value", json_number(e.value)},
+          {"standard_error", json_number(e.standard_error)},
+          {"low", json_number(e.low)},
+          {"high", json_number(e.high)}};
 }
 
 Json json_of(const SplitError& split) {
@@ -34,16 +32,11 @@ Json json_of(const SplitError& split) {
 
 Json json_of(const CropWindow& w) { return {w.x, w.y, w.width, w.height}; }
 
-Json json_of(const Budget& budget) {
-  if (budget.spp) return {{"spp", budget.spp}};
-  return {{"seconds", budget.seconds}};
-}
-
 Json json_of(const FrameErrors& frame) {
-  return {{"relmse", number(frame.relmse)},
-          {"temporal", number(frame.temporal)},
-          {"temporal_flip", number(frame.temporal_flip)},
-          {"still_relmse", number(frame.still_relmse)}};
+  return {{"relmse", json_number(frame.relmse)},
+          {"temporal", json_number(frame.temporal)},
+          {"temporal_flip", json_number(frame.temporal_flip)},
+          {"still_relmse", json_number(frame.still_relmse)}};
 }
 
 /// A cell's results per frame.
@@ -62,26 +55,26 @@ Json frames_of(const Cell& cell, const std::vector<int>& numbers) {
                                      {"relmse_of_frame", &cell.worst->relmse_of_frame},
                                      {"temporal", &cell.worst->temporal},
                                      {"temporal_of_frame", &cell.worst->temporal_of_frame}})
-    json["worst_region"][name] = number(region->ratio);
+    json["worst_region"][name] = json_number(region->ratio);
   return json;
 }
 
 Json json_of(const RunResult& run) {
   const RunRecord& r = run.record;
   return {{"seed", run.seed},
-          {"relmse", number(run.relmse)},
-          {"relmse_trimmed", number(run.relmse_trimmed)},
-          {"mse", number(run.mse)},
-          {"mae", number(run.mae)},
-          {"flip", number(run.flip)},
-          {"above5", number(run.above5)},
-          {"mean_ratio", number(run.mean_ratio)},
-          {"predicted_relmse", number(run.predicted_relmse)},
-          {"predicted_relmse_low", number(run.predicted_low)},
-          {"predicted_relmse_high", number(run.predicted_high)},
-          {"coverage", number(run.coverage)},
-          {"temporal", number(run.temporal)},
-          {"temporal_flip", number(run.temporal_flip)},
+          {"relmse", json_number(run.relmse)},
+          {"relmse_trimmed", json_number(run.relmse_trimmed)},
+          {"mse", json_number(run.mse)},
+          {"mae", json_number(run.mae)},
+          {"flip", json_number(run.flip)},
+          {"above5", json_number(run.above5)},
+          {"mean_ratio", json_number(run.mean_ratio)},
+          {"predicted_relmse", json_number(run.predicted_relmse)},
+          {"predicted_relmse_low", json_number(run.predicted_low)},
+          {"predicted_relmse_high", json_number(run.predicted_high)},
+          {"coverage", json_number(run.coverage)},
+          {"temporal", json_number(run.temporal)},
+          {"temporal_flip", json_number(run.temporal_flip)},
           {"samples_per_pixel", r.samples_per_pixel},
           {"seconds", seconds_of(r)},
           {"peak_memory_bytes", r.peak_memory_bytes},
@@ -92,47 +85,48 @@ Json json_of(const RunResult& run) {
 Json json_of(const Cell& cell, const Results& results) {
   const Suite& suite = results.suite;
   Json mae = json_of(cell.mae), flip = json_of(cell.flip), seeds = Json::array(), runs = Json::array();
-  mae["of_mean"] = number(cell.mae_of_mean);
-  flip["of_mean"] = number(cell.flip_of_mean);
+  mae["of_mean"] = json_number(cell.mae_of_mean);
+  flip["of_mean"] = json_number(cell.flip_of_mean);
   for (const RunResult& run : cell.runs) {
     seeds.push_back(run.seed);
     runs.push_back(json_of(run));
   }
-  Json json{{"scene", suite.scenes[cell.scene].name},
-            {"method", suite.methods[cell.method].name},
-            {"budget", json_of(suite.budgets[cell.budget])},
-            {"seeds", seeds},
-            {"samples_per_pixel", cell.samples_per_pixel},
-            {"pixels", cell.split.n_pixels},
-            {"non_finite_pixels", cell.split.n_non_finite},
-            {"relmse", json_of(cell.split.relative)},
-            {"relmse_trimmed", json_of(cell.relmse_trimmed)},
-            {"mse", json_of(cell.split.absolute)},
-            {"mae", mae},
-            {"flip", flip},
-            {"above5", json_of(cell.above5)},
-            {"mean_ratio", json_of(cell.split.mean_ratio)},
-            {"equal_sample", json_of(cell.equal_sample)},
-            {"equal_sample_normalised", cell.equal_sample_normalised},
-            {"equal_time", json_of(cell.equal_time)},
-            {"equal_processor_time", json_of(cell.equal_processor_time)},
-            {"seconds",
-             {{"load", json_of(cell.load_seconds)},
-              {"render", json_of(cell.render_seconds)},
-              {"estimate", json_of(cell.estimate_seconds)},
-              {"then", json_of(cell.then_seconds)},
-              {"method", json_of(cell.method_seconds)},
-              {"processor", json_of(cell.processor_seconds)},
-              {"over_budget", number(cell.time_ratio)}}},
-            {"efficiency", json_of(cell.efficiency)},
-            {"predicted_over_true", json_of(cell.predicted_over_true)},
-            {"coverage", json_of(cell.coverage)},
-            {"bounded", number(cell.bounded)},
-            {"bounds_hold", number(cell.bounds_hold)},
-            {"published", {{"relmse", number(cell.published_relmse)}, {"ratio", number(cell.published_ratio)}}},
-            {"peak_memory_bytes", cell.peak_memory_bytes},
-            {"warnings", cell.suspicions},
-            {"runs", runs}};
+  Json json{
+      {"scene", suite.scenes[cell.scene].name},
+      {"method", suite.methods[cell.method].name},
+      {"budget", json_of(suite.budgets[cell.budget])},
+      {"seeds", seeds},
+      {"samples_per_pixel", cell.samples_per_pixel},
+      {"pixels", cell.split.n_pixels},
+      {"non_finite_pixels", cell.split.n_non_finite},
+      {"relmse", json_of(cell.split.relative)},
+      {"relmse_trimmed", json_of(cell.relmse_trimmed)},
+      {"mse", json_of(cell.split.absolute)},
+      {"mae", mae},
+      {"flip", flip},
+      {"above5", json_of(cell.above5)},
+      {"mean_ratio", json_of(cell.split.mean_ratio)},
+      {"equal_sample", json_of(cell.equal_sample)},
+      {"equal_sample_normalised", cell.equal_sample_normalised},
+      {"equal_time", json_of(cell.equal_time)},
+      {"equal_processor_time", json_of(cell.equal_processor_time)},
+      {"seconds",
+       {{"load", json_of(cell.load_seconds)},
+        {"render", json_of(cell.render_seconds)},
+        {"estimate", json_of(cell.estimate_seconds)},
+        {"then", json_of(cell.then_seconds)},
+        {"method", json_of(cell.method_seconds)},
+        {"processor", json_of(cell.processor_seconds)},
+        {"over_budget", json_number(cell.time_ratio)}}},
+      {"efficiency", json_of(cell.efficiency)},
+      {"predicted_over_true", json_of(cell.predicted_over_true)},
+      {"coverage", json_of(cell.coverage)},
+      {"bounded", json_number(cell.bounded)},
+      {"bounds_hold", json_number(cell.bounds_hold)},
+      {"published", {{"relmse", json_number(cell.published_relmse)}, {"ratio", json_number(cell.published_ratio)}}},
+      {"peak_memory_bytes", cell.peak_memory_bytes},
+      {"warnings", cell.suspicions},
+      {"runs", runs}};
   if (!cell.frames.empty()) json.update(frames_of(cell, results.scenes[cell.scene].scene.frames));
   return json;
 }
@@ -151,7 +145,7 @@ Json json_of(const SceneResult& result) {
             {"origin", reference.origin},
             {"spp", reference.spp},
             {"seconds", reference.seconds},
-            {"relmse", number(reference.relmse)}}}};
+            {"relmse", json_number(reference.relmse)}}}};
 }
 
 /// The first value of a key in a file of "key : value" lines; "" if there is none.
@@ -205,12 +199,12 @@ Json to_json(const Results& results) {
     json["summary"].push_back({{"method", suite.methods[s.method].name},
                                {"budget", json_of(suite.budgets[s.budget])},
                                {"scenes", s.n_scenes},
-                               {"samples_per_pixel", number(s.samples_per_pixel)},
-                               {"relmse", number(s.relmse)},
+                               {"samples_per_pixel", json_number(s.samples_per_pixel)},
+                               {"relmse", json_number(s.relmse)},
                                {"equal_sample", json_of(s.equal_sample)},
                                {"equal_sample_normalised", s.equal_sample_normalised},
                                {"equal_time", json_of(s.equal_time)},
-                               {"published_ratio", number(s.published_ratio)},
+                               {"published_ratio", json_number(s.published_ratio)},
                                {"unusable", unusable}});
   }
   for (const Failure& f : results.failures)

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "lab/json_values.h"
 #include "sequences/frame_names.h"
 
 namespace covary::lab {
@@ -50,11 +51,6 @@ void check_published(const Suite& suite, std::vector<std::string>& problems) {
         if (!suite.method(method) && reported.insert(method).second)
           problems.push_back(
               fmt::format("published: no method is named '{}'{}", method, did_you_mean(method, methods)));
-}
-
-Json json_of(const Budget& budget) {
-  if (budget.spp) return {{"spp", budget.spp}};
-  return {{"seconds", budget.seconds}};
 }
 
 Json json_of(const ReferencePlan& plan) {

@@ -15,7 +15,6 @@ namespace {
 
 constexpr double kSeconds = 0.25;       // for the samples, at most
 constexpr double kFewestPixels = 4000;  // of the picture that measures the speed
-constexpr int kMostStride = 16;
 constexpr uint64_t kOtherSeed = 0x6c697665;
 
 /// The render's integrator, or path tracing in place of one that has to be chosen or trained first.

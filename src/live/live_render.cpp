@@ -21,7 +21,6 @@ using Json = nlohmann::json;
 
 constexpr double kNumbersSeconds = 0.25;  // between numbers for the page
 constexpr double kLastSeconds = 3;        // that readers have to take the last picture
-constexpr int kMostStride = 16;
 
 /// Whether the estimator makes another image of the films than their mean.
 bool makes_image(const Plan& plan) { return !plan.method->film_holds_image(); }

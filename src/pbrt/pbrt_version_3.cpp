@@ -106,7 +106,7 @@ ObjectBuilder translucent(PbrtParameters& p, PbrtNames& names) {
                      {{"reflectance", part(*reflect)}, {"transmittance", part(*transmit)}});
 }
 
-ObjectBuilder mix(PbrtParameters& p, PbrtNames& names) {
+ObjectBuilder version_3_mix(PbrtParameters& p, PbrtNames& names) {
   Value amount = 0.5;
   if (const PbrtParameter* given = p.find("amount")) {
     const auto value = given->type == "float" ? Value(p.get_float("amount", 0.5)) : spectrum_value(p, "amount", names);
@@ -181,7 +181,7 @@ std::optional<ObjectBuilder> make_pbrt_material_3(const std::string& type, PbrtP
   if (type == "uber") return uber(p, names);
   if (type == "substrate") return substrate(p, names);
   if (type == "translucent") return translucent(p, names);
-  if (type == "mix") return mix(p, names);
+  if (type == "mix") return version_3_mix(p, names);
   if (type == "disney") return disney(p, names);
   if (type == "fourier") return fourier(p);
   if (type == "kdsubsurface") return make_pbrt_subsurface(p, names);
