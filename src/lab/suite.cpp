@@ -192,8 +192,9 @@ std::string scenes_folder(const Suite& suite, const std::string& word, const std
   if (!suite.scene_root.empty())
     if (std::string folder = folder_with(suite.scene_root, suite.scenes[0].file, program); !folder.empty())
       return folder;
-  throw Error(ErrorCode::kUsage, fmt::format("the suite '{}' needs --scenes DIR, the folder that holds {}", suite.name,
-                                             suite.scenes[0].file));
+  throw Error(ErrorCode::kUsage, fmt::format("the suite '{0}' needs --scenes DIR, the folder that holds {1} (`covary "
+                                             "scenes {0}` says where its scenes come from)",
+                                             suite.name, suite.scenes[0].file));
 }
 
 std::string own_scenes_folder(const std::string& program) {

@@ -521,7 +521,12 @@ class Mistakes(ExperimentTest):
         for arguments, message in ((["qiuck"], "no suite is named 'qiuck'; did you mean 'quick'"),
                                    ([], "no suite given"),
                                    (["iicv-table1", "-o", "out"],
-                                    "needs --scenes DIR, the folder that holds bathroom2/scene_v3.xml")):
+                                    "needs --scenes DIR, the folder that holds bathroom2/scene_v3.xml (`covary scenes "
+                                    "iicv-table1` says where its scenes come from)"),
+                                   (["iicv-table1", "-o", "out", "--scenes", "nowhere"],
+                                    "--scenes 'nowhere': there is no such folder"),
+                                   (["iicv", "-o", "out", "--scenes", "nowhere"],
+                                    "--scenes 'nowhere': there is no such folder")):
             done = self.run_covary([COVARY, "experiment", *arguments])
             self.assertEqual(done.returncode, 2, done.stderr)
             self.assertIn(message, done.stderr)
