@@ -189,8 +189,9 @@ struct Inputs {
   CombineRequest request;
 
   explicit Inputs(const CombineOptions& o)
-      : independent(o.independent, layer_of_view(o.independent[0], o.independent_layer, o.view)) {
-    if (!o.crn.empty()) crn.emplace(o.crn, layer_of_view(o.crn[0], o.crn_layer, o.view));
+      : independent(o.independent, layer_of_view(o.independent[0], o.independent_layer, o.view),
+                    "--independent-layer") {
+    if (!o.crn.empty()) crn.emplace(o.crn, layer_of_view(o.crn[0], o.crn_layer, o.view), "--crn-layer");
     if (!o.light.empty()) light.emplace(std::vector{o.light});
     request.estimator = estimator_of(o);
     request.settings = pair_settings(

@@ -192,23 +192,31 @@ void convert_exr(const ConvertOptions& options) {
     fmt::print(stderr, "warning: {}\n", what);
 }
 
-/// A picture that fills its frame to PNG, in the memory of a few rows; false if it is of another kind.
-bool convert_to_png_by_rows(const ConvertOptions& options) {
+/// A picture that fills its frame to PNG, or one of another format to EXR, in the memory of a few rows; false if it is
+/// of another kind.
+bool convert_by_rows(const ConvertOptions& options) {
+  const std::string &input = options.files[0], &output = options.files[1], extension = lower_extension(output);
   if (options.files.size() > 2 || options.colours || options.choice.view == "all" ||
-      lower_extension(options.files[1]) != ".png")
+      (extension != ".png" && extension != ".exr"))
     return false;
-  const std::string& input = options.files[0];
-  ImageRows file(input, chosen_layer(input, options.choice), options.checksums());
-  const ImagePlace& place = file.place();
+  const std::string layer = chosen_layer(input, options.choice);
+  std::optional<ImageRows> file;
+  file.emplace(input, layer, options.checksums());
+  const ImagePlace place = file->place();
   if (!(place.window == CropWindow{0, 0, place.frame_width, place.frame_height})) return false;
-  file.convert_to(ColourSpace::rec709());
-  write_png_rows(options.files[1], place.frame_width, place.frame_height, [&](int first, int n) {
-    Image colours = file.read(first, n), alpha = file.has_alpha() ? file.read_alpha(first, n) : Image();
-    for (size_t i = 0; file.has_straight_alpha() && i < alpha.data.size(); ++i)
+  const auto rows = [&](int first, int n) {
+    if (first == 0) file.emplace(input, layer, options.checksums());  // once more
+    file->convert_to(ColourSpace::rec709());
+    Image colours = file->read(first, n), alpha = file->has_alpha() ? file->read_alpha(first, n) : Image();
+    for (size_t i = 0; file->has_straight_alpha() && i < alpha.data.size(); ++i)
       for (size_t c = 0; c < 3; ++c) colours.data[3 * i + c] *= alpha.data[i];
     expose(options, colours);
     return std::pair(std::move(colours), std::move(alpha));
-  });
+  };
+  if (extension == ".png")
+    write_png_rows(output, place.frame_width, place.frame_height, rows);
+  else
+    write_exr_rows(output, place, attributes_of(options, false), rows);
   return true;
 }
 
@@ -282,7 +290,7 @@ void convert(const ConvertOptions& options) {
   outputs.writes_result(kOutput, output, OutputKind::kImage, "convert", options.overwrite);
   if (inputs.size() == 1 && lower_extension(output) == ".exr" && !options.colours && is_exr_image(inputs[0]))
     return convert_exr(options);
-  if (convert_to_png_by_rows(options)) return;
+  if (convert_by_rows(options)) return;
   check_memory(options);
   std::vector<LoadedPicture> pictures;
   for (const std::string& input : inputs) read_pictures(options, input, pictures);

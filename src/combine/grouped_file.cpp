@@ -60,14 +60,6 @@ std::pair<std::string, int> split_number(const std::string& name) {
   return {name.substr(0, digits), std::stoi(name.substr(digits))};
 }
 
-std::string list_layers(const ExrFile& file, const std::vector<ColourLayer>& layers) {
-  std::vector<std::string> names;
-  for (const ColourLayer& l : layers) names.push_back(l.name.empty() ? "R,G,B" : fmt::format("'{}'", l.name));
-  if (!names.empty()) return fmt::format("images in it: {}", fmt::join(names, ", "));
-  for (const ExrFile::Channel& c : file.channels()) names.push_back(c.name);
-  return fmt::format("channels in it: {}", fmt::join(names, ", "));
-}
-
 /// Whether layers STEM0, STEM1, … are groups of samples, if nobody says so: of the name that covary gives them, or the
 /// only layers of colours. Other numbered layers are light groups, mattes or AOVs.
 bool are_groups(const std::string& stem, size_t n, const std::vector<ColourLayer>& layers) {
@@ -92,34 +84,21 @@ std::vector<ColourLayer> numbered_layers(const std::vector<ColourLayer>& layers,
   return {};
 }
 
-/// The only image in a file.
-ColourLayer single_layer(const std::string& path, const ExrFile& file, const std::vector<ColourLayer>& layers,
-                         const std::string& name) {
-  std::vector<std::string> names;
-  for (const ColourLayer& layer : layers) {
-    if (layer.name == name) return layer;
-    names.push_back(layer.name);
-  }
+/// The layer of this name, or the file's picture. `option`: the argument that gives the name.
+ColourLayer single_layer(const std::string& path, const ExrFile& file, const std::string& name,
+                         const std::string& option) {
   const std::vector<Picture> pictures = find_pictures(file.channels());
   for (const Picture& picture : pictures)
     if (picture.layer == name || (name.empty() && pictures.size() == 1)) return {picture.layer, picture.channels};
-  if (!name.empty() && std::any_of(file.channels().begin(), file.channels().end(),
-                                   [&](const ExrFile::Channel& c) { return c.name == name; }))
-    return {name, {name, name, name}};
-  if (!name.empty())
-    fail_input(path, fmt::format("no image '{}'{}; {}", name, did_you_mean(name, names), list_layers(file, layers)));
-  if (pictures.size() > 1)
-    fail_input(path, fmt::format("several pictures, {}; choose one by {}--layer", text_of(pictures),
-                                 pictures[0].view.empty() ? "" : "--view or "));
-  fail_input(path,
-             fmt::format("{}; {}",
-                         layers.empty() ? "no image of channels R, G and B" : "several images; choose one by --layer",
-                         list_layers(file, layers)));
+  if (name.empty()) refuse_layer(path, file.channels(), name, option);
+  const std::vector<std::string> channels = layer_channels(path, file.channels(), name);
+  return {name, {channels[0], channels[1], channels[2]}};
 }
 
 }  // namespace
 
-GroupedFile::GroupedFile(const std::vector<std::string>& paths, const std::string& layer) {
+GroupedFile::GroupedFile(const std::vector<std::string>& paths, const std::string& layer, const std::string& option)
+    : layer_option_(option) {
   COVARY_CHECK(!paths.empty(), "a grouped image needs a file");
   name_ = paths.size() == 1 ? paths[0] : fmt::format("{} … {}", paths.front(), paths.back());
   source_.files = paths;
@@ -156,16 +135,15 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
   const size_t first_group = groups_.size();
   if (numbered.size() > 1) {
     if (!only_file)
-      fail_input(
-          path,
-          fmt::format("holds {} groups of samples; give it alone, or files of one image each, or --layer for the image",
-                      numbered.size()));
+      fail_input(path, fmt::format(
+                           "holds {} groups of samples; give it alone, or files of one image each, or {} for the image",
+                           numbered.size(), layer_option_));
     for (const ColourLayer& group : numbered) {
       groups_.push_back({0, group.channels});
       source_.used.insert(group.channels.begin(), group.channels.end());
     }
   } else {
-    groups_.push_back({files_.size() - 1, single_layer(path, file, layers, layer).channels});
+    groups_.push_back({files_.size() - 1, single_layer(path, file, layer, layer_option_).channels});
     if (files_.size() == 1) source_.picture = groups_[0].channels;
   }
   std::vector<std::string> read;
@@ -220,9 +198,12 @@ void GroupedFile::take_counts(const std::string& path) {
                                  there.x, there.y, name_, here.width, here.height, here.x, here.y));
   }
   const bool is_only = file->channels().size() == 1;
-  if (!is_only && !file->find(kCounts))
-    fail_input(path,
-               fmt::format("expected one channel, or one that is named '{}'; {}", kCounts, list_layers(*file, {})));
+  if (!is_only && !file->find(kCounts)) {
+    std::vector<std::string> names;
+    for (const ExrFile::Channel& channel : file->channels()) names.push_back(channel.name);
+    fail_input(path, fmt::format("expected one channel, or one that is named '{}'; channels in it: {}", kCounts,
+                                 fmt::join(names, ", ")));
+  }
   counts_channel_ = is_only ? file->channels()[0].name : kCounts;
   file->check({&counts_channel_, 1});
   counts_file_ = std::move(file);

@@ -23,8 +23,9 @@ class GroupedFile {
   /// Several paths: one image each, giving the groups in that order. If a file has several images, `layer` names one
   /// (groups without their number), or else the picture is used (film/pictures.h). Numbered layers of other names than
   /// "group" are groups only if they are named, or if there are no other colours. Throws Error(kIo), and Error(kInput)
-  /// listing the layers found.
-  explicit GroupedFile(const std::vector<std::string>& paths, const std::string& layer = "");
+  /// listing the layers found, with `option`, the argument that names one.
+  explicit GroupedFile(const std::vector<std::string>& paths, const std::string& layer = "",
+                       const std::string& option = "--layer");
 
   int width() const { return place_.window.width; }
   int height() const { return place_.window.height; }
@@ -91,7 +92,7 @@ class GroupedFile {
   ResultSource source_;
   ImagePlace place_;
   double samples_ = 0, samples_of_group_ = 0;
-  std::string sampling_, scene_hash_, settings_, light_paths_per_sample_, light_film_, name_, denoised_;
+  std::string layer_option_, sampling_, scene_hash_, settings_, light_paths_per_sample_, light_film_, name_, denoised_;
   bool has_half_ = false, has_counts_ = false, has_variance_ = false, is_one_film_ = false;
   std::unique_ptr<ExrFile> counts_file_;
   std::string counts_path_, counts_channel_;

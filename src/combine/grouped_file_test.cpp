@@ -54,9 +54,10 @@ class GroupedFileTest : public ::testing::Test {
     }
   }
 
-  std::string message(const std::vector<std::string>& paths, const std::string& layer = "") {
+  std::string message(const std::vector<std::string>& paths, const std::string& layer = "",
+                      const std::string& option = "--layer") {
     try {
-      GroupedFile file(paths, layer);
+      GroupedFile file(paths, layer, option);
       return "no error";
     } catch (const Error& e) {
       std::string text = e.what();
@@ -97,8 +98,11 @@ TEST_F(GroupedFileTest, TakesOnlyGroupsForGroups) {
   expect_groups(GroupedFile({write("lights.exr", {"", "light1", "light2"})}, "light"), {1, 2});
   expect_groups(GroupedFile({write("lights.exr", {"", "light1", "light2"})}, "light2"), {2});
   expect_groups(GroupedFile({write("mattes.exr", {"beauty", "uCryptoObject00", "uCryptoObject01"})}), {0});
-  EXPECT_EQ(message({write("two.exr", {"uCryptoObject00", "uCryptoObject01"})}),
-            "two.exr: several images; choose one by --layer; images in it: 'uCryptoObject00', 'uCryptoObject01'");
+  EXPECT_EQ(
+      message({write("two.exr", {"uCryptoObject00", "uCryptoObject01"})}),
+      "two.exr: no picture, only mattes (Cryptomatte); give the file that holds the picture, or choose a layer by "
+      "--layer (layers: uCryptoObject00, uCryptoObject01; channels: uCryptoObject00.B uCryptoObject00.G "
+      "uCryptoObject00.R uCryptoObject01.B uCryptoObject01.G uCryptoObject01.R)");
 }
 
 TEST_F(GroupedFileTest, ReadsAttributesOfFilms) {
@@ -133,9 +137,10 @@ TEST_F(GroupedFileTest, ReadsTheCountsOfAFilm) {
 
 TEST_F(GroupedFileTest, SaysWhatIsWrong) {
   const std::string two = write("two.exr", {"ambient", "depth"}), plain = write("plain.exr", {""});
-  EXPECT_EQ(message({two}), "two.exr: several images; choose one by --layer; images in it: 'ambient', 'depth'");
-  EXPECT_EQ(message({two}, "ambiant"),
-            "two.exr: no image 'ambiant'; did you mean 'ambient'?; images in it: 'ambient', 'depth'");
+  const std::string have = "(layers: ambient, depth; channels: ambient.B ambient.G ambient.R depth.B depth.G depth.R)";
+  EXPECT_EQ(message({two}), "two.exr: no channels R G B; choose a layer by --layer " + have);
+  EXPECT_EQ(message({two}, "", "--crn-layer"), "two.exr: no channels R G B; choose a layer by --crn-layer " + have);
+  EXPECT_EQ(message({two}, "ambiant"), "two.exr: no layer 'ambiant'; did you mean 'ambient'? " + have);
   EXPECT_EQ(
       message({plain, write("groups.exr", {"", "group0", "group1"})}),
       "groups.exr: holds 2 groups of samples; give it alone, or files of one image each, or --layer for the image");
@@ -152,7 +157,7 @@ TEST_F(GroupedFileTest, SaysWhatIsWrong) {
   const ExrPlane plane{"Z", ExrPlane::Type::kFloat, depth.data(), sizeof(float)};
   const std::string z = folder_.file("z.exr");
   write_exr(z, {kWidth, kHeight, {0, 0, kWidth, kHeight}}, {}, {&plane, 1});
-  EXPECT_EQ(message({z}), "z.exr: no image of channels R, G and B; channels in it: Z");
+  EXPECT_EQ(message({z}), "z.exr: no channels R G B; choose a channel by --layer, such as 'Z' (channels: Z)");
 }
 
 }  // namespace

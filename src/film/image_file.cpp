@@ -89,8 +89,6 @@ std::vector<Layer> find_layers(const std::vector<ExrFile::Channel>& channels) {
   return layers;
 }
 
-constexpr size_t kMostNamed = 20;  // layers and channels listed in a message
-
 constexpr double kImageBytes = 3 * sizeof(float);  // per pixel
 
 }  // namespace
@@ -111,34 +109,17 @@ std::vector<std::string> layer_channels(const std::string& path, const std::vect
                                         const std::string& layer) {
   std::vector<std::string> names = find_layer(channels, layer);
   if (!names.empty() && names[0] == names[2] && !channels_that_end(channels, layer, {"y", "ry", "by"}).empty())
-    fail_input(path, "luminance and chroma (channels Y, RY, BY); expected R, G and B");
+    refuse_layer(path, channels, layer, "--layer");
   if (!names.empty()) return names;
-  const std::vector<Layer> layers = find_layers(channels);
-  if (layer.empty() && layers.size() == 1) return layers[0].channels;
-  const std::vector<Picture> pictures = layer.empty() ? find_pictures(channels) : std::vector<Picture>();
-  if (pictures.size() == 1) return {pictures[0].channels.begin(), pictures[0].channels.end()};
+  if (layer.empty()) {
+    const std::vector<Layer> layers = find_layers(channels);
+    if (layers.size() == 1) return layers[0].channels;
+    const std::vector<Picture> pictures = find_pictures(channels);
+    if (pictures.size() == 1) return {pictures[0].channels.begin(), pictures[0].channels.end()};
+  }
   for (const ExrFile::Channel& c : channels)
     if (!layer.empty() && c.name == layer) return {c.name, c.name, c.name};
-  std::string known, all;
-  for (size_t i = 0; i < std::min(layers.size(), kMostNamed); ++i)
-    known += (known.empty() ? "" : ", ") + (layers[i].name.empty() ? "R G B" : layers[i].name);
-  if (layers.size() > kMostNamed) known += ", …";
-  for (size_t i = 0; i < std::min(channels.size(), kMostNamed); ++i) all += (i ? " " : "") + channels[i].name;
-  if (channels.size() > kMostNamed) all += " …";
-  const std::string have = fmt::format("layers: {}; channels: {}", known.empty() ? "none" : known, all);
-  if (layer.empty() && pictures.size() > 1)
-    fail_input(path, fmt::format("several pictures, {}; choose one by {}--layer", text_of(pictures),
-                                 pictures[0].view.empty() ? "" : "--view or "));
-  if (layer.empty() && known.empty() && !channels.empty())
-    fail_input(path, fmt::format("no channels R G B; choose a channel by --layer, such as '{}' (channels: {})",
-                                 channels[0].name, all));
-  if (layer.empty()) fail_input(path, "no channels R G B; choose a layer (" + have + ")");
-  std::vector<std::string> candidates;
-  for (const Layer& known_layer : layers)
-    if (!known_layer.name.empty()) candidates.push_back(known_layer.name);
-  for (const ExrFile::Channel& c : channels)
-    if (c.name.size() > 1 && c.name.find('.') == std::string::npos) candidates.push_back(c.name);
-  fail_input(path, fmt::format("no layer '{}'{} ({})", layer, did_you_mean(layer, candidates), have));
+  refuse_layer(path, channels, layer, "--layer");
 }
 
 ImageInfo info_of(const ImageHeader& header) {

@@ -109,8 +109,8 @@ TEST(ImageFile, ReadsPartsAsLayers) {
   }
   EXPECT_EQ(read_image(path, "depth").image.rgb(3, 2), Spectrum(2));
   EXPECT_EQ(read_image(path, "ambient").image.rgb(0, 0), Spectrum(1));
-  EXPECT_TRUE(
-      contains(message_of([&] { read_image(path); }), "choose a layer (layers: ambient, depth; channels: ambient.B"));
+  EXPECT_TRUE(contains(message_of([&] { read_image(path); }),
+                       "choose a layer by --layer (layers: ambient, depth; channels: ambient.B"));
 }
 
 TEST(ImageFile, RejectsDeepPixels) {
@@ -356,7 +356,7 @@ TEST(ImageFile, LuminanceAndChromaAreNoGreyPicture) {
   const std::string path = test_file("a.exr");
   write_pixel(path, {"Y", "RY", "BY"}, {});
   EXPECT_TRUE(contains(message_of([&] { read_image(path); }, ErrorCode::kInput),
-                       "luminance and chroma (channels Y, RY, BY); expected R, G and B"));
+                       "luminance and chroma of full resolution (channels Y, RY, BY); save the picture as R, G and B"));
 }
 
 }  // namespace

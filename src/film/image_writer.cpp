@@ -155,8 +155,7 @@ void write_png(const std::string& path, const Image& linear, const Image& alpha)
   write_content(path, content);
 }
 
-void write_png_rows(const std::string& path, int width, int height,
-                    const std::function<std::pair<Image, Image>(int first, int n)>& rows) {
+void write_png_rows(const std::string& path, int width, int height, const PictureRows& rows) {
   constexpr int kRows = 64;
   OutputFile file(path);
   std::unique_ptr<PngRowWriter> writer;

@@ -37,10 +37,16 @@ Image framed(const Image& image, const ImagePlace& place);
 /// text chunk `Software` identifies covary. Throws Error(kIo).
 void write_png(const std::string& path, const Image& linear, const Image& alpha = {});
 
-/// The same, row by row in little memory: `rows` gives n rows from the first one on, and their alpha (empty: none, for
-/// all rows).
-void write_png_rows(const std::string& path, int width, int height,
-                    const std::function<std::pair<Image, Image>(int first, int n)>& rows);
+/// n rows of a picture from the first one on, and their alpha (empty: none, for all rows).
+using PictureRows = std::function<std::pair<Image, Image>(int first, int n)>;
+
+/// The same, row by row in little memory.
+void write_png_rows(const std::string& path, int width, int height, const PictureRows& rows);
+
+/// The EXR file of write_image(), row by row in little memory: asks for all rows in their order twice, first for their
+/// checksums. Throws Error(kIo).
+void write_exr_rows(const std::string& path, const ImagePlace& place,
+                    const std::map<std::string, std::string>& attributes, const PictureRows& rows);
 
 /// Whether the file is a PNG written by write_png().
 bool is_own_png(const std::string& path);

@@ -8,7 +8,12 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <limits>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "core/srgb.h"
 #include "film/image_file.h"
@@ -20,6 +25,11 @@ namespace {
 using test_support::contains, test_support::message_of, test_support::test_file;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+std::string content(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
 
 /// Values from -1 to 40, some of which need full float precision.
 Image picture() {
@@ -66,6 +76,32 @@ TEST(ImageWriter, ExrKeepsTheWindow) {
 }
 
 /// A shared exponent, 8 bits for the largest channel; nothing negative, no infinity, no NaN.
+TEST(ImageWriter, WritesExrByRowsWithTheBytesOfTheWhole) {
+  Image image(5, 150, 3), alpha(5, 150, 1);
+  for (size_t i = 0; i < image.data.size(); ++i) image.data[i] = 0.1f * static_cast<float>(i) + 1e-5f;
+  for (size_t i = 0; i < alpha.data.size(); ++i) alpha.data[i] = 1 / static_cast<float>(1 + i % 7);
+  const ImagePlace place{9, 160, {2, 4, 5, 150}};
+  const std::map<std::string, std::string> attributes = {{"covary:seed", "3"}};
+  for (const Image& a : {alpha, Image()}) {
+    std::vector<int> asked;
+    const auto rows = [&](int first, int n) {
+      asked.push_back(first);
+      const auto of = [&](const Image& all) {
+        Image part(5, all.data.empty() ? 0 : n, all.channels);
+        std::copy_n(all.data.begin() + static_cast<ptrdiff_t>(first) * 5 * all.channels, part.data.size(),
+                    part.data.begin());
+        return part;
+      };
+      return std::pair(of(image), a.data.empty() ? Image() : of(a));
+    };
+    write_image(test_file("whole.exr"), image, place, attributes, a);
+    write_exr_rows(test_file("rows.exr"), place, attributes, rows);
+    EXPECT_EQ(content(test_file("rows.exr")), content(test_file("whole.exr")));
+    EXPECT_EQ(asked, (std::vector{0, 64, 128, 0, 64, 128}));
+    EXPECT_EQ(read_image(test_file("rows.exr")).image.data, image.data);
+  }
+}
+
 TEST(ImageWriter, HdrHoldsItsRange) {
   Image image = picture();
   image.pixel(2, 2)[0] = kNan;

@@ -8,6 +8,8 @@
 #include <map>
 #include <set>
 
+#include "core/error.h"
+#include "film/input_error.h"
 #include "imageio/exr_picture.h"
 
 namespace covary {
@@ -110,7 +112,69 @@ std::vector<Picture> layers_named(const std::string& path, const std::vector<Exr
   return found;
 }
 
+/// The names, at most 20 of them.
+std::string listed(const std::vector<std::string>& names, const char* separator) {
+  constexpr size_t kMostNamed = 20;
+  const auto n = static_cast<ptrdiff_t>(std::min(names.size(), kMostNamed));
+  const std::string text = fmt::format("{}", fmt::join(names.begin(), names.begin() + n, separator));
+  return names.size() > kMostNamed ? text + separator + "…" : text;
+}
+
+/// What a file holds, for messages.
+struct Contents {
+  std::vector<std::string> layers, channels;
+  std::vector<std::string> names;  ///< that may have been meant
+
+  explicit Contents(const std::vector<ExrFile::Channel>& all) {
+    for (const ExrFile::Channel& c : all) channels.push_back(c.name);
+    const std::set<std::string> is_channel(channels.begin(), channels.end());
+    for (const std::string& layer : image_layers(all)) {
+      if (!is_channel.contains(layer)) layers.push_back(layer.empty() ? "R G B" : layer);
+      if (layer.size() > 1) names.push_back(layer);
+    }
+  }
+  std::string text() const {
+    return fmt::format("layers: {}; channels: {}", layers.empty() ? "none" : listed(layers, ", "),
+                       listed(channels, " "));
+  }
+};
+
+/// Whether all layers of colours are mattes, as in Cryptomatte's files beside the picture's.
+bool holds_mattes_only(const std::vector<ExrFile::Channel>& channels) {
+  const std::vector<ColourLayer> layers = colour_layers(channels);
+  return !layers.empty() && std::all_of(layers.begin(), layers.end(), [](const ColourLayer& layer) {
+    return !holds_colours(layer.channels) && layer.name.find("rypto") != std::string::npos;
+  });
+}
+
 }  // namespace
+
+void refuse_layer(const std::string& path, const std::vector<ExrFile::Channel>& channels, const std::string& layer,
+                  const std::string& option) {
+  const auto has = [&](const std::string& name) {
+    return std::any_of(channels.begin(), channels.end(), [&](const ExrFile::Channel& c) {
+      return c.name == (layer.empty() ? name : layer + "." + name);
+    });
+  };
+  if (has("Y") && has("RY") && has("BY"))
+    fail_input(path, "luminance and chroma of full resolution (channels Y, RY, BY); save the picture as R, G and B");
+  const Contents contents(channels);
+  if (!layer.empty())
+    fail_input(path, fmt::format("no layer '{}'{} ({})", layer, did_you_mean(layer, contents.names), contents.text()));
+  const std::vector<Picture> pictures = find_pictures(channels);
+  if (pictures.size() > 1)
+    fail_input(path, fmt::format("several pictures, {}; choose one by {}{}", text_of(pictures),
+                                 pictures[0].view.empty() ? "" : "--view or ", option));
+  if (holds_mattes_only(channels))
+    fail_input(path,
+               fmt::format("no picture, only mattes (Cryptomatte); give the file that holds the picture, or choose a "
+                           "layer by {} ({})",
+                           option, contents.text()));
+  if (contents.layers.empty() && !channels.empty())
+    fail_input(path, fmt::format("no channels R G B; choose a channel by {}, such as '{}' (channels: {})", option,
+                                 channels[0].name, listed(contents.channels, " ")));
+  fail_input(path, fmt::format("no channels R G B; choose a layer by {} ({})", option, contents.text()));
+}
 
 std::string text_of(const std::vector<Picture>& pictures) {
   std::vector<std::string> names;

@@ -41,6 +41,11 @@ std::vector<Picture> chosen_pictures(const std::string& path, const std::vector<
 std::string chosen_layer(const std::string& path, const std::vector<ExrFile::Channel>& channels,
                          const PictureChoice& choice);
 
+/// Throws Error(kInput): the file has no such layer, or with "" no picture or several, and what to do. `option`: the
+/// argument that chooses a layer.
+[[noreturn]] void refuse_layer(const std::string& path, const std::vector<ExrFile::Channel>& channels,
+                               const std::string& layer, const std::string& option);
+
 /// The layer's name without the name of its view: "Combined" of "Combined.left", "rgba" of "rgba_left".
 std::string without_view(const std::string& layer, const std::string& view);
 

@@ -325,7 +325,7 @@ class Denoise(RenderTest):
         self.assertEqual(set(plain), {"R", "G", "B", "StdError.R", "StdError.G", "StdError.B", "Bias.R", "Bias.G",
                                       "Bias.B", *(f"{layer}.{c}" for layer in ("Direct", "Indirect") for c in "RGB")})
         self.assertEqual(plain["Direct.R"], first["Direct.R"], "as they are in the first render")
-        self.bad(1, "no image 'Dirct'; did you mean 'Direct'?", *two, "--layers", "Dirct")
+        self.bad(1, "no layer 'Dirct'; did you mean 'Direct'?", *two, "--layers", "Dirct")
         self.bad(2, "--layers are denoised by a mixture, which needs a second render of another seed", "denoise",
                  "1.exr", "-o", "c.exr", "--layers", "Direct")
         refused = self.run_covary("combine", "--crn", "1.exr", "--independent", "2.exr", "-o", "c.exr", "--layers",

@@ -257,8 +257,10 @@ class Colours(KeptTest):
 
     def test_luminance_and_chroma_are_refused(self):
         self.write("yc.exr", exr({c: [0.5] * 12 for c in ("Y", "RY", "BY")}, (4, 3)))
-        self.bad(1, "yc.exr: luminance and chroma (channels Y, RY, BY); expected R, G and B", "convert", "yc.exr",
-                 "o.png")
+        self.write("yc2.exr", exr({c: [0.25] * 12 for c in ("Y", "RY", "BY")}, (4, 3)))
+        for command in (("convert", "yc.exr", "o.png"), ("denoise", "yc.exr", "yc2.exr", "-o", "o.exr")):
+            self.bad(1, "yc.exr: luminance and chroma of full resolution (channels Y, RY, BY); save the picture as R, "
+                     "G and B", *command)
 
 
 class Frames(KeptTest):

@@ -252,7 +252,7 @@ class Limits(unittest.TestCase):
         self.assertEqual(code, 0, text)
         self.assertIn("20000 layers beside the image; the page has the first 100 (--layer shows another one)", text)
         self.write("b.exr", self.black_exr(1, 1, channels))
-        self.refused("choose a layer (layers: layer00000, layer00001, ", "view", "b.exr", "-o", "b.html")
+        self.refused("choose a layer by --layer (layers: layer00000, layer00001, ", "view", "b.exr", "-o", "b.html")
 
     def test_attributes_that_claim_too_much(self):
         self.write("a.exr", self.exr({"owner": (b"string", b"me", 1980000000)}, bytes(4000)))
