@@ -7,6 +7,8 @@
 // | two_sided    | boolean         | false   | our own: emitted on both sides                                 |
 // | power        | float           | none    | our own: `radiance` times the radiance that has this power     |
 // | per_triangle | boolean         | false   | `power` is that of the mean triangle of a mesh                 |
+// | hidden       | boolean         | false   | our own: rays pass through the surface, which shines all the   |
+// |              |                 |         | same; mirrors and cameras do not see it                        |
 #include "emitters/area.h"
 
 #include "core/warp.h"
@@ -32,7 +34,7 @@ AreaLight::AreaLight(AreaLightSettings settings)
 void AreaLight::attach(const Shape* shape) {
   COVARY_CHECK(shape != nullptr && shape_ == nullptr, "an area light belongs to exactly one shape");
   shape_ = shape;
-  const bool plain = !textured_ && !settings_.two_sided && !(settings_.power > 0);
+  const bool plain = !textured_ && !settings_.two_sided && !settings_.hidden && !(settings_.power > 0);
   samples_uv_ = textured_ && shape->sample_uv({0.5f, 0.5f}).pdf_area > 0;
   if (const auto* mesh = dynamic_cast<const TriangleMesh*>(shape); mesh && plain && mesh->parallelogram())
     parallelogram_ = {*mesh->parallelogram(), constant_};
@@ -59,6 +61,7 @@ float AreaLight::scale() const {
 }
 
 bool AreaLight::emits_towards(EmitterSample& sample) const {
+  sample.is_delta = settings_.hidden;
   if (!(sample.pdf_solid_angle > 0)) return false;
   const float cosine = dot(sample.n, sample.wi);
   if (settings_.two_sided && cosine > 0) sample.n = -sample.n;
@@ -170,6 +173,7 @@ std::shared_ptr<Emitter> make_area(Parameters& parameters) {
   AreaLightSettings settings;
   settings.radiance = parameters.get_texture("radiance", Spectrum(1), SpectrumRole::kEmission);
   settings.two_sided = parameters.get_bool("two_sided", false);
+  settings.hidden = parameters.get_bool("hidden", false);
   settings.power = parameters.get_float("power", 0, 0);
   settings.per_triangle = parameters.get_bool("per_triangle", false);
   if (!settings.radiance) return nullptr;  // already reported

@@ -22,6 +22,7 @@ struct AreaLightSettings {
   float power = 0;         ///< if positive, the factor on the radiance is such that 1 would emit this in all
   /// `power` is that of each triangle of a mesh, if all are of the same area, as in pbrt.
   bool per_triangle = false;
+  bool hidden = false;  ///< rays pass through the surface
 };
 
 class AreaLight final : public Emitter {
@@ -59,6 +60,8 @@ class AreaLight final : public Emitter {
   Spectrum power() const override;
   bool knows_power() const override { return !textured_; }
   bool emits_on_both_sides() const override { return settings_.two_sided; }
+  /// Rays do not meet a hidden light, so that only sample_towards() and sample_emission() find it.
+  bool is_delta_position() const override { return settings_.hidden; }
 
  private:
   /// A sampled surface point with its density per unit area.
@@ -76,7 +79,7 @@ class AreaLight final : public Emitter {
   float scale() const;
   Spectrum constant() const { return constant_ * scale(); }
   float n_sides() const { return settings_.two_sided ? 2 : 1; }
-  /// Turns the sample's normal towards `reference`, if that side emits; false if it does not.
+  /// Turns the sample's normal towards `reference`, if that side emits; false if it does not. Completes is_delta.
   bool emits_towards(EmitterSample& sample) const;
 
   AreaLightSettings settings_;

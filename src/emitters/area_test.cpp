@@ -383,7 +383,7 @@ TEST(AreaLight, IsMadeFromParameters) {
   EXPECT_EQ(light->surface_radiance(hit, {0, 0, 1}), Spectrum(17, 12, 4));
   const auto wrong = make_plugin<Emitter>(emitter_plugins(), "emitter", "area", {{"to_world", Transform()}});
   EXPECT_EQ(wrong.errors,
-            "test.xml:2:1: unknown parameter 'to_world' of emitter 'area'; known: 'per_triangle', 'power', "
+            "test.xml:2:1: unknown parameter 'to_world' of emitter 'area'; known: 'hidden', 'per_triangle', 'power', "
             "'radiance', 'two_sided'");
 }
 

@@ -57,8 +57,9 @@ inline LightPdfs light_pdfs(const Emitter& emitter, double nee_pmf, double pdf_s
                             const EmissionPdf& emission, const Vec3& n, const Vec3& w, double distance_squared) {
   LightPdfs pdfs;
   pdfs.is_delta = emitter.is_delta();
-  if (!emitter.is_infinite() && !emitter.is_delta_position()) pdfs.cosine = mis_cosine(n, w);
-  pdfs.direct = nee_pmf * pdf_solid_angle * (emitter.is_delta_position() ? distance_squared : pdfs.cosine);
+  const bool is_point = emitter.is_delta_position() && !emitter.shape();
+  if (!emitter.is_infinite() && !is_point) pdfs.cosine = mis_cosine(n, w);
+  pdfs.direct = nee_pmf * pdf_solid_angle * (is_point ? distance_squared : pdfs.cosine);
   pdfs.emission = emission_pmf * emission.position * emission.direction;
   return pdfs;
 }

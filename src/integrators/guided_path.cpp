@@ -112,7 +112,7 @@ void GuidedPath::on_freeze() {
 std::vector<std::string> GuidedPath::blind_spots(const Scene& scene) const {
   const auto n = std::ranges::count_if(scene.emitters(), [](const auto& light) { return light->is_delta(); });
   if (settings_.nee || n == 0) return {};
-  return {fmt::format("without NEE (`nee` off), point and directional lights are invisible: {} of {}", n,
+  return {fmt::format("without NEE (`nee` off), point, directional and hidden lights are invisible: {} of {}", n,
                       scene.emitters().size())};
 }
 

@@ -134,7 +134,7 @@ inline SubpathSums LightSubpaths::first_sums(const Scene& scene, const Bidirecti
   float pdf_direct = 1;
   if (emitter.is_environment())
     pdf_direct = emitter.environment(-ray.d).pdf_solid_angle;
-  else if (!emitter.is_delta())
+  else if (!emitter.is_delta() || emitter.shape())
     pdf_direct = emitter.pdf_solid_angle(hit.p, point_on_light(path.previous_p, start.n, start.uv));
   const float nee_pmf = UniformLights(scene).pmf(emitter);
   return mis.first_surface(light_pdfs(emitter, nee_pmf, pdf_direct, start.emission_pmf, start.emission, start.n, ray.d,

@@ -42,6 +42,7 @@ std::string own_parameter(const ObjectDescription& object) {
       {"spot", "falloff"},           {"hdrfilm", "response"},
       {"bitmap", "gamma"},           {"checkerboard", "dimension"},
       {"area", "two_sided"},         {"area", "power"},
+      {"area", "hidden"},
       {"scale", "exponent"},         {"projector", "constant_intensity"},
       {"roughplastic", "alpha_u"},   {"homogeneous", "radiance"},
       {"heterogeneous", "radiance"}, {"normalmap", "along_dv"}};

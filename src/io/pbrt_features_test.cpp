@@ -82,6 +82,36 @@ Shape "trianglemesh" "point3 P" [ -1 -1 0  1 -1 0  1 1 0  -1 1 0 ] "integer indi
   EXPECT_NEAR(lights[1]->power().g, 200, 1e-3f);
 }
 
+/// lights.cpp: DiffuseAreaLight: alpha thins the light out; a light of alpha 0 shines, but rays do not meet it. Nor do
+/// they meet other shapes of alpha 0.
+TEST_F(PbrtFeatures, LightsOfAlphaZeroShineUnseen) {
+  const LoadedScene scene = world(R"(
+AttributeBegin
+AreaLightSource "diffuse" "rgb L" [ 1 2 3 ] "bool twosided" true
+ReverseOrientation
+Shape "sphere" "float radius" 2 "float alpha" 0
+Translate 10 0 0
+Shape "disk" "float alpha" 0.25
+AttributeEnd
+Shape "sphere" "float alpha" 0
+Translate 0 0 -5
+Shape "disk"
+)");
+  EXPECT_EQ(scene.scene->n_shapes(), 3u);
+  SurfaceHit hit;
+  ASSERT_TRUE(scene.scene->intersect({{0, 0, 9}, {0, 0, -1}}, hit));
+  EXPECT_NEAR(hit.p.z, -5, 1e-5f);
+  const auto& lights = scene.scene->emitters();
+  ASSERT_EQ(lights.size(), 2u);
+  const EmitterSample unseen = lights[0]->sample_towards({0, 0, 5}, {0.3f, 0.6f}, 0.5f);
+  EXPECT_NEAR(unseen.radiance.b, 3, 1e-5f);
+  EXPECT_TRUE(unseen.is_delta);
+  EXPECT_NEAR(lights[0]->power().g, kPi * (4 * kPi * 4) * 2, 1e-2f);  // outwards alone
+  const EmitterSample thin = lights[1]->sample_towards({10, 0, 5}, {0.3f, 0.6f}, 0.5f);
+  EXPECT_NEAR(thin.radiance.b, 0.75f, 1e-5f);
+  EXPECT_FALSE(thin.is_delta);
+}
+
 /// lights.cpp: ProjectionLight::I and GoniometricLight::I: the image, in the direction of the point.
 TEST_F(PbrtFeatures, ImagesShineInTheirDirections) {
   const auto pfm = [](int width, int height, const std::vector<float>& grey) {

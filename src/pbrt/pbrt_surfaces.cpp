@@ -71,6 +71,26 @@ ObjectPtr PbrtSurfaces::make(const ObjectPtr& material, const Value& alpha, Pbrt
   return fit(whole, uv);
 }
 
+// lights.cpp: DiffuseAreaLight.
+ObjectPtr PbrtSurfaces::masked_light(const ObjectPtr& light, const Value& alpha, ObjectDescription& shape) {
+  const auto* number = std::get_if<double>(&alpha);
+  if (number && *number >= 1) return light;
+  auto copy = std::make_shared<ObjectDescription>(*light);
+  if (number && *number <= 0) {
+    set_property(*copy, "hidden", true);
+    if (shape.type == "sphere" && find(*copy, "two_sided")) {
+      std::erase_if(copy->properties, [](const Property& p) { return p.name == "two_sided"; });
+      std::erase_if(shape.properties, [](const Property& p) { return p.name == "flip_normals"; });
+    }
+  } else {
+    Value& radiance = find(*copy, "radiance")->value;
+    const ObjectPtr* texture = std::get_if<ObjectPtr>(&radiance);
+    const ObjectPtr whole = texture ? *texture : make_object("texture", "uniform", light->where, {{"value", radiance}});
+    radiance = ObjectPtr(scaled_texture(light->where, alpha, whole));
+  }
+  return copy;
+}
+
 ObjectPtr PbrtSurfaces::default_material(const SourceLocation& where) {
   if (!default_)
     default_ = make_object("bsdf", "twosided", where, {{"", ObjectPtr(make_object("bsdf", "diffuse", where))}});

@@ -16,6 +16,9 @@ class PbrtSurfaces {
   /// The material of a shape at `where` with `alpha` and texture coordinates `uv`; `material` may be null: pbrt's
   /// default. Warns about what looks different.
   ObjectPtr make(const ObjectPtr& material, const Value& alpha, PbrtUv uv, const SourceLocation& where);
+  /// The area light of a shape with `alpha`: it emits that part of its light, or all of it, unseen, if that is 0. Then
+  /// light from inside a sphere does not come out of it, as pbrt samples the half that is seen.
+  static ObjectPtr masked_light(const ObjectPtr& light, const Value& alpha, ObjectDescription& shape);
   /// The same object with textures looked up at pbrt's coordinates.
   ObjectPtr fit(const ObjectPtr& object, PbrtUv uv);
 

@@ -11,6 +11,7 @@ namespace {
 constexpr size_t kMostObjects = 1000000;  // far above what scenes need
 
 bool is_opaque(const Value& alpha) { return std::holds_alternative<double>(alpha) && std::get<double>(alpha) >= 1; }
+bool is_invisible(const Value& alpha) { return std::holds_alternative<double>(alpha) && std::get<double>(alpha) <= 0; }
 
 }  // namespace
 
@@ -33,6 +34,7 @@ void PbrtWorld::shape(const std::string& type, PbrtParameters& p, const PbrtStat
     return;
   }
   p.report_unknown(names_.version_3);
+  if (is_invisible(*alpha) && !state.area_light) return;  // pbrt's rays do not meet it
   Pending made{shape, uv, *alpha, state.material, state.inside, state.outside, state.area_light, group_ != nullptr};
   if (type == "curve" && join_curves(made)) return;
   if (group_ && made.light) p.warn("emits no light, because it is part of an object that has instances");
@@ -170,7 +172,7 @@ void PbrtWorld::finish_shape(const Pending& pending, const PbrtView& view) {
   }
   if (!pending.light) return;
   if (const ObjectPtr light = area_light(*pending.light, view))
-    set_property(shape, "", surfaces_.fit(light, pending.uv));
+    set_property(shape, "", surfaces_.fit(PbrtSurfaces::masked_light(light, pending.alpha, shape), pending.uv));
 }
 
 void PbrtWorld::finish_lights(const PbrtView& view) {

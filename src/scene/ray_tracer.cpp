@@ -100,6 +100,9 @@ void place(SurfaceHit& hit, const Transform& to_world, const Vec3& slack, bool w
   hit.frame = Frame::from_tangent(n, hit.dp_du);
 }
 
+/// Whether rays pass through it: a light that shines unseen.
+bool is_hidden(const Shape& shape) { return shape.emitter() && shape.emitter()->is_delta_position(); }
+
 void release(RTCDevice device, RTCScene top, const auto& groups) {
   if (top) rtcReleaseScene(top);
   for (const auto& group : groups) rtcReleaseScene(group.scene);
@@ -115,9 +118,11 @@ RayTracer::Group RayTracer::make_group(std::span<const ShapePtr> shapes, bool in
   rtcSetSceneBuildQuality(group.scene, moves ? RTC_BUILD_QUALITY_LOW : RTC_BUILD_QUALITY_MEDIUM);
   if (moves) rtcSetSceneFlags(group.scene, RTC_SCENE_FLAG_DYNAMIC);
   for (const ShapePtr& shape : shapes) {
-    const RTCGeometry geometry = make_geometry(device_, *shape, instanced);
-    rtcAttachGeometryByID(group.scene, geometry, static_cast<unsigned>(group.shapes.size()));
-    rtcReleaseGeometry(geometry);
+    if (!is_hidden(*shape)) {
+      const RTCGeometry geometry = make_geometry(device_, *shape, instanced);
+      rtcAttachGeometryByID(group.scene, geometry, static_cast<unsigned>(group.shapes.size()));
+      rtcReleaseGeometry(geometry);
+    }
     group.shapes.push_back(shape.get());
     group.meshes.push_back(dynamic_cast<const TriangleMesh*>(shape.get()));
   }
@@ -166,7 +171,9 @@ RayTracer::Placed RayTracer::placed_at(const Group& group, const Transform& to_w
 RayTracer::~RayTracer() { release(device_, top_.scene, groups_); }
 
 void RayTracer::move_shape(size_t index, const Shape& shape) {
-  if (const float scale = enlargement(shape); scale == 1 && enlargement(*top_.shapes[index]) == 1) {
+  if (is_hidden(shape)) {
+    // Rays do not meet it.
+  } else if (const float scale = enlargement(shape); scale == 1 && enlargement(*top_.shapes[index]) == 1) {
     set_shape(rtcGetGeometry(top_.scene, static_cast<unsigned>(index)), shape);
   } else {
     rtcDetachGeometry(top_.scene, static_cast<unsigned>(index));

@@ -36,7 +36,7 @@ class Options(CliTest):
         (self.path / "point.xml").write_text(Path(ROOM).read_text().replace("</scene>", point))
         render = ("render", "point.xml", *PLAIN[2:], "--spp", "5", "-o", "a.exr")
         self.assertNotIn("not seen", self.good(*render).stderr)
-        self.assertIn("without NEE (--set nee=off), point and directional lights are invisible: 1 of ",
+        self.assertIn("without NEE (--set nee=off), point, directional and hidden lights are invisible: 1 of ",
                       self.good(*render, "--set", "nee=off").stderr)
 
     def test_refuses_impossible_numbers(self):

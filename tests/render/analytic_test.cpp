@@ -164,6 +164,15 @@ TEST(DirectLight, DiskLight) {
                     {Bug::kNoDirectionWeight, Bug::kNoLightWeight, Bug::kCosineForgotten});
 }
 
+TEST(DirectLight, HiddenDiskLight) {
+  // As above, between the camera and the plane, at distance 3: rays pass through it.
+  const std::string disk =
+      "<shape type='disk'><transform name='to_world'><scale value='2'/><translate z='1'/></transform>"
+      "<emitter type='area'><rgb name='radiance' value='3'/><boolean name='hidden' value='true'/></emitter></shape>";
+  expect_image_mean(scene_text(kPlane + disk, 16, 16, 2, kNarrow), 16, 0.6 * 3 * 4.0 / (4 + 9), 0.02,
+                    {Bug::kCosineForgotten});
+}
+
 TEST(DirectLight, EachInstanceOfALightShines) {
   // Two instances of a sphere light: the one of SphereLight, and one twice as large in the same direction at twice the
   // distance; neither is occluded. Each gives pi L (r/d)^2 cos.

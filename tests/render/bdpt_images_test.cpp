@@ -181,6 +181,19 @@ TEST(BdptImages, ThinLensAndHiddenLights) {
       64, 0.07);
 }
 
+// Lights that rays pass through: a sphere in front of the camera, and a rectangle.
+TEST(BdptImages, LightsThatRaysPassThrough) {
+  std::string light = area_light(5);
+  light.replace(light.find("</emitter>"), 0, "<boolean name='hidden' value='true'/>");
+  expect_images_of_path(
+      bdpt_scene(leaning_floor(diffuse(0.8)) +
+                     rectangle("<scale value='4'/><rotate x='1' angle='180'/><translate y='1' z='8'/>", diffuse(0.8)) +
+                     rectangle("<rotate x='1' angle='120'/><translate y='2' z='4'/>", light) +
+                     sphere("0", "0.5", "2", "0.7", light),
+                 kSize, 4, "", sensor()),
+      64, 0.06, {Bug::kLightPmfForgotten, Bug::kSplatsNotDivided});
+}
+
 /// A floor, a ceiling and a light within 80 units of the camera, with all lengths multiplied by `scale`.
 std::string scaled_scene(const std::string& scale) {
   const auto placed = [&](const std::string& transform, const std::string& content) {
