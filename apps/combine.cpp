@@ -25,6 +25,7 @@
 #include "core/memory_limit.h"
 #include "core/stopwatch.h"
 #include "declared_options.h"
+#include "dependent_tests/dependent_tests.h"
 #include "estimators/mean.h"
 #include "estimators/sample_counts.h"
 #include "film/film_file.h"
@@ -360,7 +361,8 @@ void add_combine(CLI::App& app) {
   std::vector<Option> of_estimator = options_of_estimators(pair_estimator_names());
   std::erase_if(of_estimator, [](const Option& option) {
     return std::find(std::begin(kAdaptiveOptions), std::end(kAdaptiveOptions), option.name) !=
-           std::end(kAdaptiveOptions);
+               std::end(kAdaptiveOptions) ||
+           option.name == kAllocationOption;
   });
   add_method_options(*command, {{of_estimator, &o->of_estimator}});
   add_value(*command, "--view", o->view, "NAME", "View (eye) of stereo files");

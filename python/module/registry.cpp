@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "dependent_tests/dependent_tests.h"
 #include "estimators/sample_counts.h"
 #include "integrators/registry.h"
 #include "metrics/metrics.h"
@@ -37,7 +38,8 @@ const char* passes_of(const Method& method) {
 }
 
 bool is_adaptive_option(const std::string& name) {
-  return std::find(std::begin(kAdaptiveOptions), std::end(kAdaptiveOptions), name) != std::end(kAdaptiveOptions);
+  return std::find(std::begin(kAdaptiveOptions), std::end(kAdaptiveOptions), name) != std::end(kAdaptiveOptions) ||
+         name == kAllocationOption;
 }
 
 nb::dict option_dict(const Option& option) {

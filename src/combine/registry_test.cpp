@@ -85,7 +85,7 @@ OptionValues with_what_it_needs(const std::string& name, OptionValues values) {
   const auto given = [&](std::initializer_list<const char*> options) {
     return std::any_of(options.begin(), options.end(), [&](const char* o) { return values.contains(o); });
   };
-  if (given({"max-region", "min-centre-drop", "falloff"})) values["paper"] = "";
+  if (given({"max-region", "min-centre-drop", "falloff", "norm", "allocation"})) values["paper"] = "";
   if (has(options_of_estimator(name), "adaptive")) values["adaptive"] = "";
   return values;
 }
@@ -114,10 +114,16 @@ TEST(EstimatorRegistry, ValuesReachTheOptions) {
   EXPECT_EQ(made("cv-baseline", {{"k", "9"}, {"window", "5"}, {"ridge", "0.001"}}),
             cv_baseline(g, h, baseline).estimate.data);
   DependentTestsOptions tests = DependentTestsOptions::paper();
-  tests.regions = {6, 0.001f, Falloff::kSpline};
-  EXPECT_EQ(made("dependent-tests",
-                 {{"paper", ""}, {"max-region", "6"}, {"min-centre-drop", "0.001"}, {"falloff", "spline"}}),
+  tests.regions = {6, 0.001f, Falloff::kSpline}, tests.norm = Norm::kEuclidean;
+  EXPECT_EQ(made("dependent-tests", {{"paper", ""},
+                                     {"max-region", "6"},
+                                     {"min-centre-drop", "0.001"},
+                                     {"falloff", "spline"},
+                                     {"norm", "euclidean"}}),
             dependent_tests(g, h, tests).estimate.data);
+  const OptionValues by_variance = {{"paper", ""}, {"norm", "euclidean"}, {"allocation", "variance"}};
+  const CountOptions counts = make_estimator("dependent-tests", by_variance).adaptive->counts;
+  EXPECT_EQ(std::pair(counts.allocation, counts.norm), std::pair(Allocation::kVariance, Norm::kEuclidean));
   DependentTestsOptions exact;
   exact.window = 5;
   EXPECT_EQ(made("dependent-tests", {{"window", "5"}}), dependent_tests(g, h, exact).estimate.data);

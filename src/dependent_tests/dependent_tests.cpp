@@ -116,7 +116,8 @@ Image filter_and_combine(const GroupedImage& crn, const GroupedImage& independen
                          const DependentFilters& filters, DependentTestsStages* stages) {
   const bool exact = options.filter == DependentFilter::kExact;
   const int border = exact ? options.window / 2 : options.regions.max_region;
-  const FilterInput input = filter_input(crn, independent, valid, options.variance, options.smoothing, border);
+  const FilterInput input =
+      filter_input(crn, independent, valid, options.variance, options.smoothing, border, options.norm);
   std::optional<Planes> scale;
   if (exact && options.guard > 0) scale = difference_scale(input, valid, options.guard);
   FilteredImage filtered =
@@ -163,9 +164,9 @@ bool is_odd(int value, int low) {
 }
 
 bool in_range(const DependentTestsOptions& o) {
-  return is_odd(o.window, 3) && is_odd(o.smoothing, 1) && is_odd(o.measure_window, 3) &&
-         (o.guard == 0 || is_odd(o.guard, 1)) && o.regions.max_region >= 1 && o.regions.max_region <= 63 &&
-         o.regions.min_centre_drop >= 0;
+  return (o.norm == Norm::kSum || o.filter == DependentFilter::kPaper) && is_odd(o.window, 3) &&
+         is_odd(o.smoothing, 1) && is_odd(o.measure_window, 3) && (o.guard == 0 || is_odd(o.guard, 1)) &&
+         o.regions.max_region >= 1 && o.regions.max_region <= 63 && o.regions.min_centre_drop >= 0;
 }
 
 }  // namespace
@@ -215,15 +216,18 @@ void declare(Settings& p, DependentTestsOptions& o) {
                                                                   {"count", Falloff::kCount},
                                                                   {"spline", Falloff::kSpline},
                                                                   {"gaussian", Falloff::kGaussian}};
+  static constexpr std::pair<const char*, Norm> kNorms[] = {{"sum", Norm::kSum}, {"euclidean", Norm::kEuclidean}};
   p.whole("window", o.window, kWindowRange, kWindowHelp);
   p.whole("max-region", o.regions.max_region, {.low = 1, .high = 63}, "Maximum side of a region of `paper`");
   p.real("min-centre-drop", o.regions.min_centre_drop, {.low = 0},
          "Regions grow while their centre's weight drops by at least this much");
   p.choice<Falloff>("falloff", o.regions.falloff, kFalloffs, "Weight by distance; count: pyramid by number of pixels");
+  p.choice<Norm>("norm", o.norm, kNorms, "Of colours: sum of channels, or Euclidean",
+                 {.effect = OptionEffect::kPasses});
   const bool exact = o.filter == DependentFilter::kExact;
   p.only_if(exact, {"window"}, "with `paper`");
-  p.only_if(!exact, {"max-region", "min-centre-drop", "falloff"},
-            "without `paper`: only the published filter has regions");
+  p.only_if(!exact, {"max-region", "min-centre-drop", "falloff", "norm", kAllocationOption},
+            "without `paper`: only the published filter has regions, norms and counts to choose from");
 }
 
 }  // namespace
@@ -234,10 +238,17 @@ DeclaredDependentTests declare_dependent_tests(Settings& p) {
   DeclaredDependentTests declared;
   if (paper) declared.filter = DependentTestsOptions::paper();
   CountOptions& counts = declared.adaptive.counts;
-  if (paper) counts.allocation = Allocation::kEqualError, counts.min_spp = 0, counts.smoothing = 1;
+  if (paper) counts.min_spp = 0, counts.smoothing = 1;
   counts.classes = paper;
   ask_for(p, declared.adaptive);
+  static constexpr std::pair<const char*, Allocation> kAllocations[] = {{"relative-error", Allocation::kEqualError},
+                                                                        {"variance", Allocation::kVariance}};
+  Allocation allocation = Allocation::kEqualError;
+  p.choice<Allocation>(kAllocationOption, allocation, kAllocations,
+                       "Samples by relative error, or as variance over colour", {.effect = OptionEffect::kPasses});
+  if (paper) counts.allocation = allocation;
   declare(p, declared.filter);
+  counts.norm = declared.filter.norm;
   return declared;
 }
 

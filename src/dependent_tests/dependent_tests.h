@@ -49,7 +49,8 @@ struct DependentTestsOptions {
   int window = 7;         ///< of kExact: side of the square around a pixel, odd, 3 … 63
   CombinationWeights weights = CombinationWeights::kMeasured;
   VarianceSource variance = VarianceSource::kBoth;
-  int smoothing = 7;  ///< side of the window over which sigma^2 is averaged, odd, 1 … 63
+  Norm norm = Norm::kSum;  ///< with kExact always kSum
+  int smoothing = 7;       ///< side of the window over which sigma^2 is averaged, odd, 1 … 63
   /// Side of the window over which the brightness of the two images is compared, odd, 1 … 63; 0: no comparison. Only
   /// for kExact. Differences Delta are multiplied by the ratio where the independent image is brighter.
   int guard = 15;
@@ -96,6 +97,8 @@ struct DeclaredDependentTests {
 DeclaredDependentTests declare_dependent_tests(Settings& settings);
 
 inline constexpr const char* kDependentTests = "dependent-tests";
+/// Its option that, like kAdaptiveOptions, only affects how passes are rendered.
+inline constexpr const char* kAllocationOption = "allocation";
 /// The estimator `dependent-tests` with these options. Throws Error(kUsage) listing everything wrong with them.
 Method make_dependent_tests(Settings& options);
 

@@ -135,7 +135,8 @@ class RegionBatch {
       const vint inside = (column >= splat_int(0)) & (column < splat_int(input_.width())) &
                           splat_int(qy >= 0 && qy < input_.height() ? -1 : 0);
       const vfloat dr = load(d.row(0, qy) + qx) - r, dg = load(d.row(1, qy) + qx) - g, db = load(d.row(2, qy) + qx) - b;
-      const vfloat length = max(dr, -dr) + max(dg, -dg) + max(db, -db);
+      const vfloat length = input_.norm == Norm::kEuclidean ? sqrt(squared_length(dr, dg, db))
+                                                            : max(dr, -dr) + max(dg, -dg) + max(db, -db);
       differs |= inside & (load(input_.count.row(0, qy) + qx) != count_);
       inside_[i] = inside ? splat(1) : splat(0);
       differences_[i] = inside ? length : splat(0);

@@ -58,7 +58,8 @@ struct FilteredImage {
         effective_samples(width, height, 1) {}
 };
 
-/// The border of the input must be at least max_region. Bit-identical for any number of threads.
+/// Delta is in the norm of the input, whose border must be at least max_region. Bit-identical for any number of
+/// threads.
 FilteredImage region_filter(const FilterInput& input, const RegionOptions& options);
 
 }  // namespace covary

@@ -34,23 +34,25 @@ struct Demand {
 };
 
 /// Brightness |C| of each pixel.
-Planes brightness(const FilterInput& input) {
+Planes brightness(const FilterInput& input, Norm norm) {
   Planes plane(input.width(), input.height(), 1, 0, 0);
   for (int y = 0; y < input.height(); ++y)
     for (int x = 0; x < input.width(); ++x)
-      plane.row(0, y)[x] =
-          colour_length({input.dependent.row(0, y)[x], input.dependent.row(1, y)[x], input.dependent.row(2, y)[x]});
+      plane.row(0, y)[x] = colour_length(
+          {input.dependent.row(0, y)[x], input.dependent.row(1, y)[x], input.dependent.row(2, y)[x]}, norm);
   return plane;
 }
 
 /// (3 sigma)^2 / |C|^2 of each pixel, as in [Csonka2002] Sec. 5, N = (3 sigma / (eps |C|))^2 - n; except for
-/// equal-error, with |C| averaged as well and 0.01 added to its square.
+/// equal-error, with |C| averaged as well and 0.01 added to its square. For variance (3 sigma)^2 / |C|.
 std::vector<double> squared_errors(const GroupedImage& image, const CountOptions& options) {
   long n_nonfinite = 0;
   const std::vector<unsigned char> valid = finite_pixels(image, image, n_nonfinite);
-  const FilterInput input = filter_input(image, image, valid, VarianceSource::kDependent, options.smoothing, 0);
-  const bool exact = options.allocation == Allocation::kEqualError;
-  Planes means = brightness(input);
+  const FilterInput input =
+      filter_input(image, image, valid, VarianceSource::kDependent, options.smoothing, 0, options.norm);
+  const bool of_variance = options.allocation == Allocation::kVariance;
+  const bool exact = of_variance || options.allocation == Allocation::kEqualError;
+  Planes means = brightness(input, options.norm);
   if (!exact) means = box_mean(means, valid, options.smoothing, 0, 0);
   std::vector<double> errors(valid.size());
   for (int y = 0; y < image.height; ++y)
@@ -58,7 +60,7 @@ std::vector<double> squared_errors(const GroupedImage& image, const CountOptions
       const size_t pixel = static_cast<size_t>(y) * image.width + x;
       const double variance = 9.0 * input.variance.row(0, y)[x], mean = means.row(0, y)[x];
       if (!valid[pixel] || variance <= 0) continue;
-      errors[pixel] = variance / std::max(mean * mean + (exact ? 0 : kOffset), 1e-30);
+      errors[pixel] = variance / std::max((of_variance ? mean : mean * mean) + (exact ? 0 : kOffset), 1e-30);
     }
   return errors;
 }
@@ -94,6 +96,10 @@ Demand demand_of(const GroupedImage& image, const CountOptions& options, std::sp
     demand.of_pixel = squared_errors(image, options);                   // (3 sigma / |C|)^2
     if (options.first_pass_counts) demand.already = mean_count(image);  // n of [Csonka2002] Sec. 5
     demand.for_error = per_error;                                       // 1 / eps^2
+    return demand;
+  }
+  if (options.allocation == Allocation::kVariance) {
+    demand.of_pixel = squared_errors(image, options);
     return demand;
   }
   const bool is_filtered = options.allocation == Allocation::kDenoised;
@@ -187,6 +193,11 @@ uint32_t class_of(double samples) {
 }
 
 void CountOptions::check_limits(uint32_t multiple) const {
+  if (allocation == Allocation::kVariance && relative_error)
+    throw Error(
+        ErrorCode::kUsage,
+        "`allocation` is variance, whose numbers give no relative error: expected samples or a time instead of one, "
+        "or `allocation` relative-error");
   const uint32_t least = std::max(multiple, static_cast<uint32_t>(min_spp));
   if (max_spp && static_cast<uint32_t>(*max_spp) / multiple * multiple < least)
     throw Error(ErrorCode::kUsage,

@@ -14,6 +14,8 @@
 //                 and the cost c of a sample. The image's squared error, including bias, replaces the variance,
 //                 averaged over 15 x 15 pixels; at least half and at most four times the mean of N. [Firmino2023] have
 //                 the same aim, with derivatives of the network.
+//   variance      N proportional to sigma^2 / |C|, [Csonka2002] Sec. 3, which does not give the equal relative error
+//                 that the section wants.
 //   uniform       the same in all pixels; the remainder of the budget is spread, except when rounding to classes: then
 //                 all are equal, and no class is needed.
 //
@@ -32,11 +34,12 @@
 #include <vector>
 
 #include "film/grouped_image.h"
+#include "filters/norm.h"
 #include "settings/settings.h"
 
 namespace covary {
 
-enum class Allocation { kEqualError, kLeastError, kUniform, kDenoised };
+enum class Allocation { kEqualError, kVariance, kLeastError, kUniform, kDenoised };
 
 struct CountOptions {
   Allocation allocation = Allocation::kLeastError;
@@ -47,10 +50,12 @@ struct CountOptions {
   bool first_pass_counts = true;        ///< the first pass is part of the image
   /// Allocate the sum including the first pass's samples, so that pixels get what they lack.
   bool tops_up = false;
-  /// Side of the window over which sigma^2 and, except for kEqualError, |C| are averaged, odd, 1 … 63.
+  Norm norm = Norm::kSum;  ///< of colours, for kEqualError and kVariance
+  /// Side of the window over which sigma^2 and, except for kEqualError and kVariance, |C| are averaged, odd, 1 … 63.
   int smoothing = 7;
 
-  /// Throws Error(kUsage) if no multiple of `multiple` is at most max_spp and at least min_spp.
+  /// Throws Error(kUsage) if no multiple of `multiple` is at most max_spp and at least min_spp, and for a relative
+  /// error with kVariance, which has none.
   void check_limits(uint32_t multiple) const;
 };
 

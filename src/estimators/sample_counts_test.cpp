@@ -130,6 +130,31 @@ TEST(SampleCounts, EqualErrorIsThePublishedFormula) {
   }
 }
 
+/// Sec. 3 of [Csonka2002], with sigma^2 of Sec. 5 in either norm.
+TEST(SampleCounts, CanBeProportionalToVarianceOverColour) {
+  const test::Grouped image = noisy_first_pass();
+  CountOptions options = options_of(Allocation::kVariance);
+  options.min_spp = 0;
+  for (const Norm norm : {Norm::kSum, Norm::kEuclidean}) {
+    options.norm = norm;
+    const std::vector<uint32_t> counts = sample_counts(image.view(), 10000, options);
+    std::vector<double> demand;
+    double sum = 0;
+    for (int p = 0; p < kWidth * kHeight; ++p) {
+      const float* v = image.view().pixel(p % kWidth, p / kWidth);  // two samples, the same in all channels
+      const double factor = norm == Norm::kSum ? 3 : std::sqrt(3.0);
+      const double C = factor * 0.5 * (double{v[0]} + v[3]), deviation = factor * (double{v[0]} - v[3]);
+      sum += demand.emplace_back(deviation * deviation / 2 / C);
+    }
+    for (int p = 0; p < kWidth * kHeight; ++p) {
+      const double wanted = 10000.0 * kWidth * kHeight * demand[p] / sum;
+      EXPECT_NEAR(counts[p], wanted, 1 + 1e-4 * wanted);
+    }
+  }
+  options.relative_error = 0.1f;
+  EXPECT_TRUE(contains(message_of([&] { sample_counts(image.view(), 9, options); }), "`allocation` is variance"));
+}
+
 TEST(SampleCounts, LeastErrorIsProportionalToTheRootOfRelativeDeviation) {
   const test::Grouped image = noisy_first_pass();
   const std::vector<uint32_t> counts = sample_counts(image.view(), 10000, options_of(Allocation::kLeastError));

@@ -21,17 +21,19 @@ Spectrum mean_of(const GroupedImage& image, int x, int y) {
   return {static_cast<float>(sum[0] * scale), static_cast<float>(sum[1] * scale), static_cast<float>(sum[2] * scale)};
 }
 
-/// Variance of one sample as a scalar: (sum of the channels' standard deviations)^2, an upper bound on the variance of
-/// colour_length(), exact if channels vary proportionally.
-float scalar_variance(const Spectrum& variance) {
+/// Variance of one sample as a scalar, sum |C_s - C|^2 / (n - 1): exact for kEuclidean; for kSum (sum of the channels'
+/// standard deviations)^2, an upper bound, exact if channels vary proportionally.
+float scalar_variance(const Spectrum& variance, Norm norm) {
+  if (norm == Norm::kEuclidean) return variance.r + variance.g + variance.b;
   const float sum = std::sqrt(variance.r) + std::sqrt(variance.g) + std::sqrt(variance.b);
   return sum * sum;
 }
 
-float pooled_variance(const GroupedImage& a, const GroupedImage& b, int x, int y) {
+float pooled_variance(const GroupedImage& a, const GroupedImage& b, int x, int y, Norm norm) {
   const double of_a = variance_freedom(a, x, y), of_b = variance_freedom(b, x, y);
   if (of_a + of_b <= 0) return 0;
-  const double sum = of_a * scalar_variance(a.sample_variance(x, y)) + of_b * scalar_variance(b.sample_variance(x, y));
+  const double sum =
+      of_a * scalar_variance(a.sample_variance(x, y), norm) + of_b * scalar_variance(b.sample_variance(x, y), norm);
   return static_cast<float>(sum / (of_a + of_b));
 }
 
@@ -86,8 +88,10 @@ Planes box_mean(const Planes& image, const std::vector<unsigned char>& valid, in
 }
 
 FilterInput filter_input(const GroupedImage& crn, const GroupedImage& independent,
-                         const std::vector<unsigned char>& valid, VarianceSource source, int smoothing, int border) {
+                         const std::vector<unsigned char>& valid, VarianceSource source, int smoothing, int border,
+                         Norm norm) {
   FilterInput input;
+  input.norm = norm;
   input.dependent = mean_planes(crn, valid, border, kFar);
   input.independent = mean_planes(independent, valid, border, 0);
   input.count = Planes(crn.width, crn.height, 1, border, 0);
@@ -96,8 +100,8 @@ FilterInput filter_input(const GroupedImage& crn, const GroupedImage& independen
     for (int x = 0; x < crn.width; ++x) {
       if (!valid[static_cast<size_t>(y) * crn.width + x]) continue;
       input.count.row(0, y)[x] = static_cast<float>(independent.count(x, y));
-      input.variance.row(0, y)[x] = source == VarianceSource::kBoth ? pooled_variance(crn, independent, x, y)
-                                                                    : scalar_variance(crn.sample_variance(x, y));
+      input.variance.row(0, y)[x] = source == VarianceSource::kBoth ? pooled_variance(crn, independent, x, y, norm)
+                                                                    : scalar_variance(crn.sample_variance(x, y), norm);
     }
   });
   if (smoothing > 1) input.variance = box_mean(input.variance, valid, smoothing, border, 0);

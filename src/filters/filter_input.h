@@ -3,29 +3,25 @@
 // samples.
 #pragma once
 
-#include <cmath>
 #include <vector>
 
 #include "film/grouped_image.h"
+#include "filters/norm.h"
 #include "filters/planes.h"
 
 namespace covary {
 
 /// Planes have a border that matches nothing: far away, without samples.
 struct FilterInput {
-  Planes dependent;    ///< 3: means C_d of the CRN image; kFar outside and at invalid pixels
-  Planes independent;  ///< 3: means C_i of the independent image
-  Planes variance;     ///< 1: sigma^2 of one sample
-  Planes count;        ///< 1: samples N of the independent image; 0 outside and at invalid pixels
+  Planes dependent;        ///< 3: means C_d of the CRN image; kFar outside and at invalid pixels
+  Planes independent;      ///< 3: means C_i of the independent image
+  Planes variance;         ///< 1: sigma^2 of one sample
+  Planes count;            ///< 1: samples N of the independent image; 0 outside and at invalid pixels
+  Norm norm = Norm::kSum;  ///< of sigma
 
   int width() const { return count.width(); }
   int height() const { return count.height(); }
 };
-
-/// Norm of a colour or of a difference of colours: sum of absolute channel values, [Csonka2002] end of Sec. 4.
-inline float colour_length(const Spectrum& colour) {
-  return std::abs(colour.r) + std::abs(colour.g) + std::abs(colour.b);
-}
 
 /// sigma^2 from the samples of the CRN image, or of both images weighted by degrees of freedom.
 enum class VarianceSource { kDependent, kBoth };
@@ -36,7 +32,8 @@ double variance_freedom(const GroupedImage& image, int x, int y);
 
 /// `smoothing`: side of the window over which sigma^2 is averaged, odd; 1: none.
 FilterInput filter_input(const GroupedImage& crn, const GroupedImage& independent,
-                         const std::vector<unsigned char>& valid, VarianceSource source, int smoothing, int border);
+                         const std::vector<unsigned char>& valid, VarianceSource source, int smoothing, int border,
+                         Norm norm = Norm::kSum);
 
 /// Mean over the window around each pixel of a plane, restricted to pixels inside the frame with nonzero `valid`; 0 if
 /// there are none. The result has the border `border`, filled with `outside`.

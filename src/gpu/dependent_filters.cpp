@@ -23,9 +23,11 @@ Buffer<float> upload(Device& device, const Planes& planes) {
   return device.upload(std::span(std::as_const(values)));
 }
 
-device::Kernel kernel(Device& device, const char* name, Falloff falloff, bool planted_bug) {
+device::Kernel kernel(Device& device, const char* name, Falloff falloff, Norm norm, bool planted_bug) {
   return device.kernel("dependent_tests.cl", name,
-                       with_bug({fmt::format("FALLOFF={}", static_cast<int>(falloff))}, planted_bug));
+                       with_bug({fmt::format("FALLOFF={}", static_cast<int>(falloff)),
+                                 fmt::format("EUCLIDEAN={}", static_cast<int>(norm == Norm::kEuclidean))},
+                                planted_bug));
 }
 
 struct InputBuffers {
@@ -60,9 +62,10 @@ struct ResultBuffers {
 FilteredImage region_filter(Device& device, const FilterInput& input, const RegionOptions& options, bool planted_bug) {
   const InputBuffers in(device, input);
   const ResultBuffers result(device, input);
-  device.launch(kernel(device, "region_filter", options.falloff, planted_bug), image_of(input.width(), input.height()),
-                kOfImage, in.dependent, in.independent, in.variance, in.count, input.width(), input.height(),
-                options.max_region, options.min_centre_drop, result.colour, result.values);
+  device.launch(kernel(device, "region_filter", options.falloff, input.norm, planted_bug),
+                image_of(input.width(), input.height()), kOfImage, in.dependent, in.independent, in.variance, in.count,
+                input.width(), input.height(), options.max_region, options.min_centre_drop, result.colour,
+                result.values);
   return result.download(device, input);
 }
 
@@ -71,9 +74,10 @@ FilteredImage bound_filter(Device& device, const FilterInput& input, int window,
   const InputBuffers in(device, input);
   const ResultBuffers result(device, input);
   const Buffer<float> scale = difference_scale ? upload(device, *difference_scale) : device.make<float>(1);
-  device.launch(kernel(device, "bound_filter", Falloff::kPyramid, planted_bug), image_of(input.width(), input.height()),
-                kOfImage, in.dependent, in.independent, in.variance, in.count, scale, int{difference_scale != nullptr},
-                input.width(), input.height(), window / 2, result.colour, result.values);
+  device.launch(kernel(device, "bound_filter", Falloff::kPyramid, input.norm, planted_bug),
+                image_of(input.width(), input.height()), kOfImage, in.dependent, in.independent, in.variance, in.count,
+                scale, int{difference_scale != nullptr}, input.width(), input.height(), window / 2, result.colour,
+                result.values);
   return result.download(device, input);
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The filters of dependent tests [Csonka2002] Sec. 4 and 5. With the means C_d of the image with common random numbers
 // and C_i of the independent one, sigma^2 the variance of a sample and N the samples of a pixel, both weight the pixels
-// q around p by Delta_q = |C_d[p] - C_d[q]|, the sum of absolute differences of channels:
+// q around p by Delta_q = |C_d[p] - C_d[q]|, the sum of absolute differences of channels, or their Euclidean norm:
 //
 //     region_filter: the published one (dependent_tests/region_filter.h),
 //     bound_filter: the minimiser of its error bound (dependent_tests/bound_filter.h).
@@ -9,9 +9,9 @@
 // Results have five values a pixel after three colours: `colour`, then in `values` the number of pixels averaged, the
 // weight of the pixel itself, the error bound, the effective number of samples.
 //
-// Options: FALLOFF, 0 … 3 as Falloff.
-// Compiled: FALLOFF=0
-// Compiled: FALLOFF=3
+// Options: FALLOFF, 0 … 3 as Falloff; EUCLIDEAN, whether the norm is.
+// Compiled: FALLOFF=0 EUCLIDEAN=0
+// Compiled: FALLOFF=3 EUCLIDEAN=0
 #include "portable.h"
 #include "groups.h"
 #include "pixels.h"
@@ -25,9 +25,9 @@
 
 // Norm of a difference of colours, [Csonka2002] end of Sec. 4.
 FUNCTION float difference_of(GLOBAL const float* dependent, int p, int q) {
-  float sum = 0;
-  for (int c = 0; c < 3; ++c) sum += fabs(dependent[3 * q + c] - dependent[3 * p + c]);
-  return sum;
+  const float r = dependent[3 * q] - dependent[3 * p], g = dependent[3 * q + 1] - dependent[3 * p + 1];
+  const float b = dependent[3 * q + 2] - dependent[3 * p + 2];
+  return EUCLIDEAN ? sqrt(squared_length(r, g, b)) : fabs(r) + fabs(g) + fabs(b);
 }
 
 // [Csonka2002] Sec. 4: with f = offset - slope Delta, weights before normalisation are f+ d.
