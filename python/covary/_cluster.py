@@ -7,6 +7,7 @@ import hashlib
 import importlib.metadata
 import os
 import tempfile
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
@@ -18,6 +19,7 @@ from .errors import IoError, UsageError
 
 T = TypeVar("T")
 
+_PATIENCE = 60.0  # seconds without a result after which workers are looked for
 _RETRIES = 5  # of a task that an error of the machine ended
 _CLUSTER = ("cluster = SLURMCluster(…); cluster.scale(100); client = Client(cluster). scale() itself returns None, and "
             "Client(None) starts workers on this machine, which Client(LocalCluster()) does where it is wanted")
@@ -103,13 +105,33 @@ def dask() -> Any:
     return distributed
 
 
+def _completed(client: Any, futures: Iterable[Any]) -> Iterator[Any]:
+    """Futures as they complete. Warns if none does because there is no worker, which may still come."""
+    pending = set(futures)
+    while pending:
+        completed = dask().as_completed(pending, loop=client.loop, timeout=_PATIENCE)
+        while True:
+            try:
+                future = next(completed)
+            except StopIteration:
+                break
+            except dask().TimeoutError:
+                scheduler = client.scheduler_info()
+                if not scheduler["workers"]:
+                    warnings.warn(f"{len(pending)} parts wait for a worker: none is connected to "
+                                  f"{scheduler['address']}", RuntimeWarning, stacklevel=2)
+                break
+            pending.discard(future)
+            yield future
+
+
 def results(client: Any, run: Callable[..., Any],
             tasks: Iterable[tuple[T, tuple[Any, ...]]]) -> Iterator[tuple[T, Any]]:
     """Tasks with the results of `run(*arguments)` on a worker, as they complete. If one fails or the caller stops
     iterating, the rest are cancelled."""
     futures = {client.submit(run, *arguments, pure=False, retries=_RETRIES): task for task, arguments in tasks}
     try:
-        for future in dask().as_completed(futures, loop=client.loop):
+        for future in _completed(client, futures):
             yield futures[future], future.result()
             future.release()
     except BaseException:

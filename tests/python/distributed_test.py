@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import unittest
+from unittest import mock
 
 import covary
 import covary._program
@@ -138,6 +139,22 @@ class Parts(PackageTest):
                 del sys.modules["distributed"]
             else:
                 sys.modules["distributed"] = kept
+
+
+    def test_without_workers(self):
+        """It is told, and those that come later are used."""
+        from distributed import Client, LocalCluster
+        told = []
+        with LocalCluster(n_workers=0, processes=False, dashboard_address=None) as cluster, Client(cluster) as client:
+            def warn(text, category, **_):
+                told.append((text, category))
+                cluster.scale(1)
+            with mock.patch.object(covary._cluster, "_PATIENCE", 0.1), \
+                    mock.patch.object(covary._cluster.warnings, "warn", warn):
+                found = dict(covary._cluster.results(client, abs, [("a", (-1,)), ("b", (-2,))]))
+        self.assertEqual(found, {"a": 1, "b": 2})
+        self.assertRegex(told[0][0], "^2 parts wait for a worker: none is connected to inproc://")
+        self.assertIs(told[0][1], RuntimeWarning)
 
 
 class Cluster(PackageTest):
