@@ -154,7 +154,7 @@ void experiment(ExperimentCommand command) {
   add_programs("--program", command.programs, programs);
   add_programs("--renderer", command.renderers, renderers);
   if (!command.scenes.empty() && !fs::is_directory(command.scenes))
-    throw Error(ErrorCode::kUsage, "--scenes '" + command.scenes + "': there is no such folder");
+    throw Error(ErrorCode::kIo, "--scenes '" + command.scenes + "': there is no such folder");
   if (const auto paper = lab::builtin_papers().find(command.suite); paper != lab::builtin_papers().end())
     return experiment_paper(command, lab::parse_paper(std::string(paper->second), command.suite + ".json"));
   if (!command.only.empty())

@@ -128,7 +128,7 @@ double relmse(const RunResult& run) { return run.relmse; }
 double temporal(const RunResult& run) { return run.temporal; }
 double seconds(const RunResult& run) { return run.record.method_seconds(); }
 double processor(const RunResult& run) { return run.record.processor_seconds; }
-double mean(const std::vector<double>& values) { return mean_estimate(values).value; }
+double mean_of(const std::vector<double>& values) { return mean_estimate(values).value; }
 
 /// Values of the runs of both cells, paired by seed.
 template <typename Value>
@@ -244,11 +244,11 @@ std::optional<Summary> summary_of(const Results& results, const std::vector<size
   }
   summary.n_scenes = common.size();
   if (common.empty()) return summary;
-  summary.samples_per_pixel = mean(samples);
+  summary.samples_per_pixel = mean_of(samples);
   summary.equal_sample = geometric_mean_of_ratios(equal_sample);
   summary.equal_time = geometric_mean_of_ratios(equal_time);
   summary.relmse = geometric_mean(error);
-  summary.flip = mean(flip);
+  summary.flip = mean_of(flip);
   summary.published_ratio = geometric_mean(published_ratio);
   return summary;
 }
@@ -309,7 +309,7 @@ void measure(Cell& cell, const SceneInstance& scene, const SceneReferences& refe
   cell.method_seconds = mean_estimate(values_of(cell, seconds));
   cell.processor_seconds = mean_estimate(values_of(cell, processor));
   if (budget.seconds > 0) cell.time_ratio = cell.method_seconds.value / budget.seconds;
-  cell.samples_per_pixel = mean(values_of(cell, [](const RunResult& r) { return r.record.samples_per_pixel; }));
+  cell.samples_per_pixel = mean_of(values_of(cell, [](const RunResult& r) { return r.record.samples_per_pixel; }));
   for (const RunResult& run : cell.runs)
     cell.peak_memory_bytes = std::max(cell.peak_memory_bytes, run.record.peak_memory_bytes);
   cell.efficiency = reciprocal_of_means(values_of(cell, relmse), values_of(cell, seconds));

@@ -21,9 +21,9 @@ using namespace lanes;
 /// Pixels of a row segment whose errors are summed.
 constexpr int kPart = 16;
 /// Relative standard error of the held-out error at which it counts as much as the estimator's own prediction.
-constexpr double kTrustedHeldOut = 0.3;
+constexpr double kTrusted = 0.3;
 /// Minimum error of the whole over the variance of the halves: one half, less a margin for noise.
-constexpr double kLeastOverHalves = 0.25;
+constexpr double kLeastOverVariance = 0.25;
 
 HeldOutRow sum_of(const std::vector<HeldOutRow>& rows) {
   HeldOutRow all;
@@ -41,12 +41,12 @@ double squared_uncertainty(const HeldOutRow& all) {
   return std::max(0.0, all.squares - all.error * all.error / all.parts) / square(all.error);
 }
 
-/// Weight of the held-out error, 0 to 1: 1 / (1 + (c / kTrustedHeldOut)^2).
-double trust_in(const HeldOutRow& all) { return 1 / (1 + squared_uncertainty(all) / square(kTrustedHeldOut)); }
+/// Weight of the held-out error, 0 to 1: 1 / (1 + (c / kTrusted)^2).
+double trust_in(const HeldOutRow& all) { return 1 / (1 + squared_uncertainty(all) / square(kTrusted)); }
 
 /// The squared error of the image of all samples.
 double error_of_whole(const HeldOutRow& all) {
-  return std::max(all.error - 0.5 * all.variance, kLeastOverHalves * all.variance);
+  return std::max(all.error - 0.5 * all.variance, kLeastOverVariance * all.variance);
 }
 
 /// Squared errors and variance of the halves in a row.

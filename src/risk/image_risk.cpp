@@ -11,7 +11,7 @@ namespace covary {
 namespace {
 
 /// Pixels of a row segment whose errors are summed.
-constexpr int kSegment = 16;
+constexpr int kPart = 16;
 /// Albedos or normals of one surface differ by no more, as sums over channels.
 constexpr float kSameSurface = 0.05f;
 
@@ -78,7 +78,7 @@ void add_groups(const ImageRiskInput& in, int x, int y, double weight, RiskRow& 
 
 /// RiskRow::spread: light that the image has from elsewhere, such as a firefly's, where the samples show none.
 double spread_at(const ImageRiskInput& in, int x, int y) {
-  constexpr double kBrighter = 10, kLeastLevel = 0.1;
+  constexpr double kBrighter = 10, kDarkest = 0.1;
   constexpr int kRadius = 2;
   const int width = in.image->width, height = in.image->height;
   const auto grey = [&](int i, int j) {
@@ -88,7 +88,7 @@ double spread_at(const ImageRiskInput& in, int x, int y) {
   };
   const float* m = in.image->pixel(x, y);
   const double own = (double{m[0]} + m[1] + m[2]) / 3;
-  double around = std::max(kLeastLevel, grey(x, y));
+  double around = std::max(kDarkest, grey(x, y));
   if (own <= kBrighter * around) return 0;
   std::vector<double> values;
   for (int j = std::max(0, y - kRadius); j <= std::min(height - 1, y + kRadius); ++j)
@@ -121,7 +121,7 @@ RiskRow risk_of_row(const ImageRiskInput& in, int y) {
       if (in.halves[0]) row.spread += spread_at(in, x, y);
       add_groups(in, x, y, w, row);
     }
-    if (x % kSegment != kSegment - 1 && x != width - 1) continue;
+    if (x % kPart != kPart - 1 && x != width - 1) continue;
     row.error += part, row.squares += square(part), row.parts += 1;
     part = 0;
   }

@@ -148,7 +148,7 @@ class WatchedFolder(CliTest):
         self.assertEqual(result.returncode, 1)
         self.assertIn("waiting for images in 'a', 'b'; Ctrl-C, or 5 s without a new one, ends\n", result.stderr)
         self.assertIn("note: a/mine.exr is left out: 'covary denoise' made it\n", result.stderr)
-        self.assertRegex(result.stderr, r"warning: bad.exr failed: a/bad.exr: .*channels in it: N, Z")
+        self.assertRegex(result.stderr, r"warning: bad.exr failed: a/bad.exr: .*\(channels: N Z\)")
         self.assertIn("warning: half.exr is incomplete: unfinished, or missing in one of 'a', 'b'\n", result.stderr)
         self.assertRegex(result.stderr, r"\nshot 1.exr: out/shot 1.exr, predicted relMSE [\d.]+\n")
         self.assertRegex(result.stderr, r"\n4 images in [\d.]+ s\n")

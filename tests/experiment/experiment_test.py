@@ -518,17 +518,17 @@ class Mistakes(ExperimentTest):
         self.bad(2, "--seeds 'x': expected a number of seeds", "--seeds", "x")
         self.bad(2, "the seed 900000001 is reserved for references", "--seeds", "3,900000001")
         self.bad(1, "crop '99x99' does not fit into the 32 x 24 frame", "--crop", "99x99")
-        for arguments, message in ((["qiuck"], "no suite is named 'qiuck'; did you mean 'quick'"),
-                                   ([], "no suite given"),
-                                   (["iicv-table1", "-o", "out"],
-                                    "needs --scenes DIR, the folder that holds bathroom2/scene_v3.xml (`covary scenes "
-                                    "iicv-table1` says where its scenes come from)"),
-                                   (["iicv-table1", "-o", "out", "--scenes", "nowhere"],
-                                    "--scenes 'nowhere': there is no such folder"),
-                                   (["iicv", "-o", "out", "--scenes", "nowhere"],
-                                    "--scenes 'nowhere': there is no such folder")):
+        nowhere = "--scenes 'nowhere': there is no such folder"
+        for code, arguments, message in (
+                (2, ["qiuck"], "no suite is named 'qiuck'; did you mean 'quick'"),
+                (2, [], "no suite given"),
+                (2, ["iicv-table1", "-o", "out"],
+                 "needs --scenes DIR, the folder that holds bathroom2/scene_v3.xml (`covary scenes iicv-table1` says "
+                 "where its scenes come from)"),
+                (1, ["iicv-table1", "-o", "out", "--scenes", "nowhere"], nowhere),
+                (1, ["iicv", "-o", "out", "--scenes", "nowhere"], nowhere)):
             done = self.run_covary([COVARY, "experiment", *arguments])
-            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertEqual(done.returncode, code, done.stderr)
             self.assertIn(message, done.stderr)
 
 
