@@ -373,9 +373,29 @@ def modules_fit(root):
     return [f"src/{module}:1: {n} lines; at most {MODULE_LINES}" for module, n in counts.items() if n > MODULE_LINES]
 
 
+def together_hides_no_constant(root):
+    """Where the files of a module are compiled together, a constant in the anonymous namespace of one file would take
+    the place of one of the same name that another file has from a header, without a word from the compiler."""
+    problems = []
+    for path in files(root, ["src", "apps"], ("CMakeLists.txt",)):
+        if not re.search(r"covary_module\(\w+ TOGETHER|covary_together\(", read(root, path)):
+            continue
+        folder = os.path.dirname(path)
+        texts = {file: re.sub(r"//.*", "", read(root, file)) for file in files(root, [folder], (".cpp",))
+                 if os.path.dirname(file) == folder and not is_test(file)}
+        for file, text in texts.items():
+            for anonymous in re.findall(r"^namespace \{$(.*?)^\}", text, re.M | re.S):
+                for name in re.findall(r"^constexpr\b[^(]*?\b(k[A-Z]\w*)(?=\s*[={\[])", anonymous, re.M):
+                    problems += [f"{other}:1: {name} would be that of {file}, with which it is compiled"
+                                 for other, uses in texts.items()
+                                 if other != file and re.search(rf"(?<![\w.>:]){name}\b", uses)
+                                 and not re.search(rf"\bconstexpr\b[^;]*\b{name}\b\s*[={{\[]", uses)]
+    return problems
+
+
 CHECKS = [lines_fit, files_fit, functions_fit, modules_fit, includes_follow_arrows, links_follow_arrows,
           python_has_no_circle, architecture_draws_the_arrows, licence_lines, no_leftovers, citations_have_entries,
-          documented_names_match_registries, documented_parameters, documented_commands]
+          documented_names_match_registries, documented_parameters, documented_commands, together_hides_no_constant]
 
 
 def length_report(root):
