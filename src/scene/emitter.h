@@ -96,7 +96,7 @@ class Emitter : public SceneObject {
   virtual std::shared_ptr<const Emitter> in_scene(const Bounds3& /*bounds*/) const { return nullptr; }
   /// Lights at infinity that a ray leaving the scene can hit (environment map, constant).
   virtual bool is_environment() const { return false; }
-  /// All light is emitted from one point.
+  /// All light is emitted from one point, or from a surface that rays do not meet (AreaLightSettings::hidden).
   virtual bool is_delta_position() const { return false; }
   /// All light travels in one direction.
   virtual bool is_delta_direction() const { return false; }
