@@ -27,7 +27,6 @@
 #include "declared_options.h"
 #include "dependent_tests/dependent_tests.h"
 #include "estimators/mean.h"
-#include "estimators/sample_counts.h"
 #include "film/film_file.h"
 #include "film/outputs.h"
 #include "frame_files.h"
@@ -359,11 +358,7 @@ void add_combine(CLI::App& app) {
   command->get_option("--estimator")
       ->transform(CLI::Validator([](std::string& name) { return needs_samples_text(name); }, ""));
   std::vector<Option> of_estimator = options_of_estimators(pair_estimator_names());
-  std::erase_if(of_estimator, [](const Option& option) {
-    return std::find(std::begin(kAdaptiveOptions), std::end(kAdaptiveOptions), option.name) !=
-               std::end(kAdaptiveOptions) ||
-           option.name == kAllocationOption;
-  });
+  std::erase_if(of_estimator, [](const Option& option) { return is_adaptive_option(option.name); });
   add_method_options(*command, {{of_estimator, &o->of_estimator}});
   add_value(*command, "--view", o->view, "NAME", "View (eye) of stereo files");
   add_stages_option(*command, o->stages);

@@ -205,8 +205,10 @@ bool convert_by_rows(const ConvertOptions& options) {
   const ImagePlace place = file->place();
   if (!(place.window == CropWindow{0, 0, place.frame_width, place.frame_height})) return false;
   const auto rows = [&](int first, int n) {
-    if (first == 0) file.emplace(input, layer, options.checksums());  // once more
-    file->convert_to(ColourSpace::rec709());
+    if (first == 0) {  // once more
+      file.emplace(input, layer, options.checksums());
+      file->convert_to(ColourSpace::rec709());
+    }
     Image colours = file->read(first, n), alpha = file->has_alpha() ? file->read_alpha(first, n) : Image();
     for (size_t i = 0; file->has_straight_alpha() && i < alpha.data.size(); ++i)
       for (size_t c = 0; c < 3; ++c) colours.data[3 * i + c] *= alpha.data[i];

@@ -60,14 +60,25 @@ def resolution_of(path, width):
     return f"{round(size['width'] * scale)}x{round(size['height'] * scale)}"
 
 
+def scene_path(folder, name):
+    """The file of a scene in a folder with a folder for each."""
+    path = folder / name / "scene_v3.xml"
+    return path if path.exists() else path.with_name("scene.xml")
+
+
+def write_rows(path, rows):
+    with open(path, "w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
 class Scene:
     """A scene with its films, references and images."""
 
     def __init__(self, options, name):
         self.options, self.name = options, name
-        self.path = options.scenes / name / "scene_v3.xml"
-        if not self.path.exists():
-            self.path = options.scenes / name / "scene.xml"
+        self.path = scene_path(options.scenes, name)
         self.folder = options.work / (name + "-turned" if options.turned else name)
         self.folder.mkdir(parents=True, exist_ok=True)
         if options.turned:
@@ -198,10 +209,7 @@ def main():
     rows = []
     for name in options.names or list(turned_cameras()):
         rows += rows_of(Scene(options, name), options)
-        with open(options.work / ("turned.csv" if options.turned else "denoising.csv"), "w", newline="") as file:
-            writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows)
+        write_rows(options.work / ("turned.csv" if options.turned else "denoising.csv"), rows)
         print(name, flush=True)
     print("\n" + tables(rows))
 

@@ -7,7 +7,6 @@ Mitsuba's error, carried to covary's time along the line through Mitsuba's two n
 covary's error. Needs NumPy, Mitsuba 3 and Open Image Denoise (COVARY_OIDN); benchmarks/README.md tells how to set them
 up."""
 import argparse
-import csv
 import json
 import math
 import os
@@ -21,7 +20,7 @@ import numpy
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE.parent / "denoising")]
 
-from denoising import geometric_mean, resolution_of, turned_cameras  # noqa: E402
+from denoising import geometric_mean, resolution_of, scene_path, turned_cameras, write_rows  # noqa: E402
 from layers import read_image  # noqa: E402
 
 REFERENCE_SEEDS = (1001, 1002)
@@ -41,9 +40,7 @@ class Scene:
         self.options, self.name = options, name
         self.folder = options.work / name
         self.folder.mkdir(parents=True, exist_ok=True)
-        self.path = options.scenes / name / "scene_v3.xml"
-        if not self.path.exists():
-            self.path = options.scenes / name / "scene.xml"
+        self.path = scene_path(options.scenes, name)
         self.resolution = resolution_of(self.path, options.width)
 
     def ours(self, spp, seed):
@@ -139,10 +136,7 @@ def main():
             row["equal_time"] = ratio
             print(json.dumps(row), flush=True)
         rows += of_scene
-        with open(options.work / "equal_time.csv", "w", newline="") as file:
-            writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows)
+        write_rows(options.work / "equal_time.csv", rows)
     print("\n" + table(rows))
 
 

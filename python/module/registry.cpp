@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "combine/combine_settings.h"
 
-#include <algorithm>
-#include <iterator>
-
 #include "dependent_tests/dependent_tests.h"
-#include "estimators/sample_counts.h"
 #include "integrators/registry.h"
 #include "metrics/metrics.h"
 #include "plans/render_settings.h"
@@ -35,11 +31,6 @@ const char* passes_of(const Method& method) {
   if (method.pair()) return "pair";
   if (method.pixel_pass()) return "samples";
   return method.is_mean() ? "any" : "independent";
-}
-
-bool is_adaptive_option(const std::string& name) {
-  return std::find(std::begin(kAdaptiveOptions), std::end(kAdaptiveOptions), name) != std::end(kAdaptiveOptions) ||
-         name == kAllocationOption;
 }
 
 nb::dict option_dict(const Option& option) {

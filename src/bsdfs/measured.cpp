@@ -136,16 +136,14 @@ class MeasuredClosure final : public BsdfClosure {
 
 /// Directional albedo for `wo`.
 Spectrum reflected(const Material& material, const Vec3& wo) {
-  constexpr int kMeasuredSide = 16;
+  constexpr int kGrid = 16;
   const MeasuredClosure closure(material, TransportMode::kRadiance);
   Spectrum sum(0);
-  for (int y = 0; y < kMeasuredSide; ++y)
-    for (int x = 0; x < kMeasuredSide; ++x)
-      sum +=
-          closure
-              .sample(wo, 0, Vec2{static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f} * (1.0f / kMeasuredSide))
-              .weight;
-  return sum / (kMeasuredSide * kMeasuredSide);
+  for (int y = 0; y < kGrid; ++y)
+    for (int x = 0; x < kGrid; ++x)
+      sum += closure.sample(wo, 0, Vec2{static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f} * (1.0f / kGrid))
+                 .weight;
+  return sum / (kGrid * kGrid);
 }
 
 class Measured final : public Bsdf {

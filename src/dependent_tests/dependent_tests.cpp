@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <utility>
 
@@ -14,6 +15,8 @@
 
 namespace covary {
 namespace {
+
+constexpr const char* kAllocationOption = "allocation";
 
 /// Factors for the differences of the CRN image: if few of its samples found the light, it is too dark, and so are its
 /// differences. Ratio of the windows' mean brightness, at least 1; kFar where only the independent image has light.
@@ -231,6 +234,11 @@ void declare(Settings& p, DependentTestsOptions& o) {
 }
 
 }  // namespace
+
+bool is_adaptive_option(const std::string& name) {
+  return name == kAllocationOption ||
+         std::find(std::begin(kAdaptiveOptions), std::end(kAdaptiveOptions), name) != std::end(kAdaptiveOptions);
+}
 
 DeclaredDependentTests declare_dependent_tests(Settings& p) {
   const bool paper = p.flag("paper", "dependent-tests as published: its filter, weights and allocation",

@@ -97,8 +97,8 @@ struct DeclaredDependentTests {
 DeclaredDependentTests declare_dependent_tests(Settings& settings);
 
 inline constexpr const char* kDependentTests = "dependent-tests";
-/// Its option that, like kAdaptiveOptions, only affects how passes are rendered.
-inline constexpr const char* kAllocationOption = "allocation";
+/// Whether an option of an estimator only affects how passes are rendered: kAdaptiveOptions, and `allocation` of this.
+bool is_adaptive_option(const std::string& name);
 /// The estimator `dependent-tests` with these options. Throws Error(kUsage) listing everything wrong with them.
 Method make_dependent_tests(Settings& options);
 

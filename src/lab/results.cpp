@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/results.h"
-#include "lab/json_values.h"
 
 #include <fmt/format.h>
 #include <sys/utsname.h>
@@ -10,6 +9,8 @@
 #include <cmath>
 #include <fstream>
 #include <thread>
+
+#include "lab/json_values.h"
 
 namespace covary::lab {
 namespace {
