@@ -9,7 +9,7 @@ namespace covary {
 namespace {
 
 TEST(Roulette, FollowsTheBrightestChannel) {
-  EXPECT_FLOAT_EQ(roulette::survival_probability({0.1f, 0.5f, 0.2f}, 1, Sampling::kIndependent), 0.5f);
+  EXPECT_FLOAT_EQ(roulette::survival_probability({0.1f, 0.5f, 0.2f}, 1, Sampling::kIndependent), std::sqrt(0.5f));
   EXPECT_FLOAT_EQ(roulette::survival_probability({0.1f, 0.0625f, 0}, 1, Sampling::kCrn), std::pow(0.1f, 0.25f));
   EXPECT_EQ(roulette::survival_probability({0, 0, 0}, 1, Sampling::kIndependent), 0);
 }
@@ -22,7 +22,8 @@ TEST(Roulette, AlwaysMayEndAPath) {
 TEST(Roulette, RefractionThatScalesRadianceDoesNotCount) {
   // On entering glass of index 1.5, radiance is divided by 1.5 squared; the path carries as much as before.
   const float scale = 1 / (1.5f * 1.5f);
-  EXPECT_FLOAT_EQ(roulette::survival_probability(Spectrum(0.6f * scale), 1.5f, Sampling::kIndependent), 0.6f);
+  EXPECT_FLOAT_EQ(roulette::survival_probability(Spectrum(0.6f * scale), 1.5f, Sampling::kIndependent),
+                  std::sqrt(0.6f));
 }
 
 // Mean of survivor_weight for survivors and 0 for the others, N = 200 000, alpha = 5e-7: detects a bias of 1.6 % of the
