@@ -22,31 +22,14 @@ constexpr size_t kPosition = 2;
 /// docs/notes/denoising.md).
 constexpr uint32_t kRound = 16;
 constexpr float kTolerance = 0.01f;
+/// Surfaces that a pixel's rays may meet, per ray that it may have. Through much glass this is the limit: more rays lower
+/// the error of the denoised image less than the time that they take (docs/notes/denoising.md, "Guides without noise").
+constexpr size_t kSurfacesPerRay = 3;
 
 /// Contribution of one camera ray to each image.
 using AuxiliarySample = std::array<Vec3, kImages>;
 
 Vec3 to_vec(const Spectrum& colour) { return {colour.r, colour.g, colour.b}; }
-
-/// Continues from `hit`, while it is mirror or glass, to the surface behind, and multiplies `throughput` along the way;
-/// false if the ray leaves the scene.
-bool follow(const Scene& scene, const PathRandom& random, Arena& arena, Ray ray, SurfaceHit& hit,
-            Spectrum& throughput) {
-  for (int bounce = 0; bounce < kFollowedBounces && !(hit.bsdf_flags & kSmooth); ++bounce) {
-    arena.reset();
-    const Vec3 wo = hit.frame.to_local(-ray.d);
-    const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, arena);
-    const uint32_t vertex = kDeltaVertices + bounce;
-    const BsdfSample next =
-        bsdf->sample(wo, random.get_1d(vertex, Event::kLobe), random.get_2d(vertex, Event::kDirection));
-    if (!next.valid()) return true;  // a surface that reflects nothing ends the path
-    throughput *= next.weight;
-    const Vec3 wi = hit.frame.to_world(next.wi);
-    ray = Ray{offset_origin(hit, wi), wi, kInfinity};
-    if (!scene.intersect(ray, hit)) return false;
-  }
-  return true;
-}
 
 /// With media: continues to the first surface that is more than a boundary, like the sample's path, or to a collision
 /// before it. At a collision, sets the values (scattering albedo, no normal, position) and returns true. Otherwise
@@ -75,34 +58,16 @@ bool ends_in_medium(const Scene& scene, const PathRandom& random, Ray& ray, Auxi
   }
 }
 
-/// Values of a camera ray that hits a surface: those of the first one, and of the one behind mirrors and glass.
-AuxiliarySample surface_sample(const Scene& scene, const PathRandom& random, const Ray& ray, SurfaceHit& hit,
-                               Arena& arena) {
-  AuxiliarySample values{};
-  values[0] = values[3] = to_vec(hit.bsdf->albedo(hit));
-  values[1] = values[4] = hit.frame.n;
-  values[kPosition] = hit.p;
-  if (hit.bsdf_flags & kSmooth) return values;
-  Spectrum throughput(1);
-  if (!follow(scene, random, arena, ray, hit, throughput)) {
-    values[3] = values[4] = {};
-    return values;
-  }
-  const Spectrum albedo = throughput * hit.bsdf->albedo(hit);
-  for (int c = 0; c < 3; ++c) values[3][c] = std::clamp(albedo[c], 0.0f, 1.0f);
-  values[4] = hit.frame.n;
-  return values;
-}
-
-/// Samples begin … end - 1 of a pixel, at most kRound, whose camera rays are traced together.
+/// Samples of a pixel, at most kRound at a time, whose rays are traced together.
 class Round {
  public:
   Round(const Scene& scene, const PassSettings& settings) : scene_(scene), settings_(settings) {}
 
-  /// Valid until the next call.
+  /// Samples begin … end - 1; valid until the next call.
   std::span<const AuxiliarySample> trace(int x, int y, uint32_t begin, uint32_t end) {
     const size_t n = end - begin;
-    randoms_.clear();
+    n_met_ = 0;
+    randoms_.clear(), ways_.clear();
     for (size_t i = 0; i < n; ++i) {
       const CameraSample sample = camera_sample(scene_, settings_, x, y, begin + i);
       randoms_.push_back(sample.random);
@@ -117,31 +82,102 @@ class Round {
         if (!hits_[i].found()) continue;
         scene_.resolve(rays_[i], hits_[i], hit);
       }
-      values_[i] = surface_sample(scene_, randoms_[i], rays_[i], hit, arena_);
+      meet(i, rays_[i], hit);
     }
+    for (int bounce = 0; bounce < kFollowedBounces && !ways_.empty(); ++bounce) follow(bounce);
+    for (const Way& way : ways_) end_at(way.sample, way.hit, way.throughput);
     return std::span(values_).first(n);
   }
 
+  /// Surfaces that the rays of the last call met.
+  size_t n_met() const { return n_met_; }
+
  private:
+  /// A sample whose ray met nothing but mirrors and glass, and its surface.
+  struct Way {
+    size_t sample;
+    Spectrum throughput;  ///< of the surfaces before
+    Vec3 wo;              ///< to where the ray comes from
+    SurfaceHit hit;
+  };
+
+  /// Values of the first surface of a sample, and, unless that is mirror or glass, of the one behind.
+  void meet(size_t sample, const Ray& ray, const SurfaceHit& hit) {
+    values_[sample] = {to_vec(hit.bsdf->albedo(hit)), hit.frame.n, hit.p, {}, {}};
+    ++n_met_;
+    if (hit.bsdf_flags & kSmooth)
+      end_at(sample, hit, Spectrum(1));
+    else
+      ways_.push_back({sample, Spectrum(1), -ray.d, hit});
+  }
+
+  /// Values of the surface behind mirrors and glass of this throughput.
+  void end_at(size_t sample, const SurfaceHit& hit, const Spectrum& throughput) {
+    const Spectrum albedo = throughput * hit.bsdf->albedo(hit);
+    for (int c = 0; c < 3; ++c) values_[sample][3][c] = std::clamp(albedo[c], 0.0f, 1.0f);
+    values_[sample][4] = hit.frame.n;
+  }
+
+  /// Continues all ways by one edge; those that end, at a surface with more than delta lobes, at one that reflects
+  /// nothing, or outside of the scene, are removed.
+  void follow(int bounce) {
+    size_t n = 0;
+    for (Way& way : ways_) {
+      arena_.reset();
+      const Vec3 wo = way.hit.frame.to_local(way.wo);
+      const BsdfClosure* bsdf = way.hit.bsdf->bind(way.hit, wo.z > 0, TransportMode::kRadiance, arena_);
+      const PathRandom& random = randoms_[way.sample];
+      const uint32_t vertex = kDeltaVertices + bounce;
+      const BsdfSample next =
+          bsdf->sample(wo, random.get_1d(vertex, Event::kLobe), random.get_2d(vertex, Event::kDirection));
+      if (!next.valid()) {
+        end_at(way.sample, way.hit, way.throughput);
+        continue;
+      }
+      way.throughput *= next.weight;
+      const Vec3 wi = way.hit.frame.to_world(next.wi);
+      way.wo = -wi;
+      rays_[n] = Ray{offset_origin(way.hit, wi), wi, kInfinity};
+      if (&ways_[n] != &way) ways_[n] = way;
+      ++n;
+    }
+    scene_.nearest(std::span(rays_).first(n), std::span(hits_).first(n), true);
+    size_t n_left = 0;
+    for (size_t i = 0; i < n; ++i) {
+      Way& way = ways_[i];
+      if (!hits_[i].found()) continue;
+      scene_.resolve(rays_[i], hits_[i], way.hit);
+      ++n_met_;
+      if (way.hit.bsdf_flags & kSmooth)
+        end_at(way.sample, way.hit, way.throughput);
+      else if (n_left++ != i)
+        ways_[n_left - 1] = way;
+    }
+    ways_.resize(n_left);
+  }
+
   const Scene& scene_;
   const PassSettings& settings_;
   Arena arena_;
   std::vector<PathRandom> randoms_;
   std::array<Ray, kRound> rays_;
   std::array<RayHit, kRound> hits_;
+  std::vector<Way> ways_;
   std::array<AuxiliarySample, kRound> values_;
+  size_t n_met_ = 0;
 };
 
-/// Means over the samples of a pixel: `most`, or as many rounds as it takes to reach kTolerance.
+/// Means over the samples of a pixel: `most`, or as many rounds as it takes to reach kTolerance or kSurfacesPerRay.
 AuxiliarySample auxiliary_means(Round& round, int x, int y, uint32_t most) {
   AuxiliarySample sums{}, squares{};
   float largest = kInfinity;  // variance of the means, over albedos and normals
   uint32_t n = 0;
-  while (n < most && largest > sqr(kTolerance)) {
+  size_t n_met = 0;
+  while (n < most && n_met < kSurfacesPerRay * most && largest > sqr(kTolerance)) {
     const uint32_t end = std::min(most, n + kRound);
     for (const AuxiliarySample& values : round.trace(x, y, n, end))
       for (size_t i = 0; i < kImages; ++i) sums[i] += values[i], squares[i] += values[i] * values[i];
-    n = end;
+    n = end, n_met += round.n_met();
     largest = 0;
     const auto count = static_cast<float>(n);
     for (size_t i = 0; i < kImages; ++i)

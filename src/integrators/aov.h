@@ -16,7 +16,8 @@ inline constexpr const char* kAuxiliaryImages[] = {"Albedo", "N", "P", "Denoisin
 inline constexpr int kFollowedBounces = 8;
 
 /// Fills film.aovs with the images, each the mean over filtered camera rays: `most` of them, or as many rounds of 16 as
-/// it takes until the standard errors of the pixel's albedos and normals are below 0.01:
+/// it takes until the standard errors of the pixel's albedos and normals are below 0.01, or its rays, through glass,
+/// have met 3 * `most` surfaces:
 ///
 ///     Albedo           reflectance of the first surface, in [0, 1]
 ///     N, P             its shading normal and position in world space
