@@ -22,8 +22,9 @@ constexpr size_t kPosition = 2;
 /// docs/notes/denoising.md).
 constexpr uint32_t kRound = 16;
 constexpr float kTolerance = 0.01f;
-/// Surfaces that a pixel's rays may meet, per ray that it may have. Through much glass this is the limit: more rays lower
-/// the error of the denoised image less than the time that they take (docs/notes/denoising.md, "Guides without noise").
+/// Surfaces that a pixel's rays may meet, per ray that it may have. Through much glass this is the limit: more rays
+/// lower the error of the denoised image less than the time that they take (docs/notes/denoising.md, "Guides without
+/// noise").
 constexpr size_t kSurfacesPerRay = 3;
 
 /// Contribution of one camera ray to each image.
