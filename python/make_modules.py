@@ -107,9 +107,9 @@ def estimators_module(estimators):
     pairs = [e for e in estimators if e["passes"] == "pair"]
     head = HEAD.format("The estimators of two images by name, with their options.", ", Literal",
                        "from ._combine import combine\n\nif TYPE_CHECKING:\n    from os import PathLike\n\n"
-                       "    from ._combine import Progress\n    from ._keywords import DenoiseMode\n"
+                       "    from ._keywords import DenoiseMode\n"
                        "    from ._result import Result\n"
-                       "    from .film import Film\n")
+                       "    from .film import Film\n    from .progress import Progress\n")
     names = sorted([identifier(e["name"]) for e in pairs])
     of_pairs = [e["name"] for e in estimators if e["is_default"] or e in pairs]
     types = [f"#: Estimators of two images.\nPairEstimator = {literal(of_pairs)}",

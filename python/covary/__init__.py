@@ -18,17 +18,17 @@ from ._progressive import Step, render_progressively
 from ._render import Scene, render, set_threads
 from ._result import BadSample, RenderResult, Result
 from ._sequence import render_frames
-from .errors import BadSamplesWarning, Error, InputError, InternalError, IoError, UsageError
+from .errors import BadSamplesWarning, CovaryWarning, Error, InputError, InternalError, IoError, UsageError
 from .estimators import *  # noqa: F403
 from .estimators import __all__ as _estimators
 from .film import Film, film_from_groups, merge_films
 from .notebook import View, view
 
 __all__ = [
-    "BadSample", "BadSamplesWarning", "Error", "Experiment", "Film", "InputError", "InputReport", "InternalError",
-    "IoError", "RenderResult", "Result", "Samples", "Scene", "Step", "UsageError", "View", "__version__",
-    "check_inputs", "combine", "denoise", "errors", "experiment", "film_from_groups", "merge_films", "metrics",
-    "program", "progress", "read_groups", "read_image", "render", "render_frames", "render_progressively", "scenes",
-    "set_threads", "view", "write_image",
+    "BadSample", "BadSamplesWarning", "CovaryWarning", "Error", "Experiment", "Film", "InputError", "InputReport",
+    "InternalError", "IoError", "RenderResult", "Result", "Samples", "Scene", "Step", "UsageError", "View",
+    "__version__", "check_inputs", "combine", "denoise", "errors", "experiment", "film_from_groups", "merge_films",
+    "metrics", "program", "progress", "read_groups", "read_image", "render", "render_frames", "render_progressively",
+    "scenes", "set_threads", "view", "write_image",
 ]
 __all__ += _estimators

@@ -142,7 +142,10 @@ def _scalar(value: Any) -> bool | int | float | str:
     if _is_bool(value):
         return bool(value)
     if hasattr(value, "__index__"):
-        index = operator.index(value)
+        try:
+            index = operator.index(value)
+        except TypeError:  # of arrays
+            raise _WrongType from None
         if not -1 << 63 <= index < 1 << 63:
             raise _WrongValue
         return index
@@ -258,7 +261,7 @@ def check_names(options: Iterable[str], arguments: Iterable[str]) -> None:
     """Raises UsageError for keywords that are misspelt arguments. Other unknown ones are left to the registry, which
     knows the options of estimators."""
     for name in options:
-        near = difflib.get_close_matches(name, arguments, 1, 0.8)
+        near = difflib.get_close_matches(name, arguments, 1, 0.8 if len(name) > 4 else 0.6)
         if name not in RenderOptions.__annotations__ and near:
             raise UsageError(f"{name}: there is no such argument; did you mean {near[0]}?")
 

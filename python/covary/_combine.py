@@ -2,26 +2,29 @@
 """Images of any renderer, as arrays or films, made into one with less noise."""
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
 from . import _covary
-from ._arguments import (Rule, array, check_some, checked, empty_or, flag, function, mapping_of, optional, path,
-                         text, whole)
+from ._arguments import (
+    Rule, array, check_names, check_some, checked, either, empty_or, flag, function, mapping_of, optional, path, text,
+    whole,
+)
 from ._options import DEFAULT, DEFAULT_OF_PAIRS, OptionValue, check_no_passes, declared_rules, text_options
 from ._result import Result
-from .errors import UsageError
+from .errors import InputError, UsageError, _warn
+from .progress import Progress, steps
 
 if TYPE_CHECKING:
     from ._keywords import DenoiseMode
     from .estimators import PairEstimator
     from .film import Film
 
-Progress = Callable[[int, int], object]
 DENOISE = declared_rules(_covary.combine_options())["denoise"]
 OIDN = empty_or(path)
+PROGRESS = optional(either("a function, True or False", flag, function))
 #: The module checks these together with their pixels.
 IMAGE = Rule("a covary.Film or an array", array.convert)
 _LAYERS = optional(mapping_of(IMAGE, "a mapping from names to arrays"))
@@ -30,7 +33,7 @@ _LAYERS = optional(mapping_of(IMAGE, "a mapping from names to arrays"))
 @checked(crn=IMAGE, independent=IMAGE, estimator=text, light=IMAGE, counts=array,
          samples=optional(whole(1, _covary.most_samples)), denoise=DENOISE, albedo=array, normal=array,
          denoising_albedo=array, denoising_normal=array, position=array, layers=_LAYERS, oidn=OIDN, device=text,
-         std_error=optional(flag), force=flag, progress=optional(function))
+         std_error=optional(flag), force=flag, progress=PROGRESS)
 def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, light: Film | None = None,
             counts: Any = None, samples: int | None = None, denoise: DenoiseMode | None = None, albedo: Any = None,
             normal: Any = None, denoising_albedo: Any = None, denoising_normal: Any = None, position: Any = None,
@@ -50,8 +53,9 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, l
         without an estimator they are those of "iicv".
     light: the film of light paths (pass "light"), to add to the result.
     counts: samples per pixel of the independent image over all groups, if they vary: whole numbers [H, W]; a Film
-        knows its own. Needs samples.
-    samples: samples per pixel of the CRN image, for counts and for estimators that need them.
+        knows its own.
+    samples: samples per pixel of the CRN image, for counts, if that is an array, and for estimators that need them.
+        Without crn, of the independent image, over all groups.
     denoise: for the least error ("auto", "error"), for little bias ("bias"), balanced, or "none"; by default "auto",
         or "none" if another estimator is named. albedo, normal, position: guides [H, W, 3], the others only with the
         albedo; denoising_albedo, denoising_normal: guides seen through mirrors and glass (from render():
@@ -63,21 +67,40 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, l
         these devices, "opencl:1" (`covary info --devices`).
     std_error: estimate the error, too; by default if the estimator can.
     force: combine even if the checks of the inputs find errors.
-    progress: called with (done, total) steps.
+    progress: True for a line of text, or a function, called with (done, total) steps.
 
-    The result has the bits of `covary combine`. Raises InputError if the inputs do not match, UsageError for options
-    that the estimator does not have.
+    Warnings of the checks are in the result, and issued as covary.CovaryWarning. The result has the bits of
+    `covary combine`. Raises InputError if the inputs do not match, UsageError for options that the estimator does not
+    have.
     """
     found: list[str] = []
     crn, independent = _groups_first("crn", crn, found), _groups_first("independent", independent, found)
+    if crn is None and not hasattr(independent, "samples_per_pixel"):
+        counts, samples = _alone(independent, counts, samples)
+    check_names(options, combine.rules)  # type: ignore[attr-defined]
     check_no_passes(options, "here are images that are rendered: counts= tells the samples that their pixels have")
     if estimator == DEFAULT and options:
         estimator = DEFAULT_OF_PAIRS  # type: ignore[assignment]  # whose options they are
     made = _covary.combine(crn, independent, None if counts is None else _counts(counts), light, albedo,
                            normal, denoising_albedo, denoising_normal, position, dict(layers or {}), estimator,
                            text_options(options, estimator), denoise or "", fspath(oidn), device, force, std_error,
-                           samples, progress)
+                           samples, steps(progress, "combining", shown=False))
+    for text in found + made["warnings"]:
+        _warn(text)
     return Result(**made | {"warnings": found + made["warnings"]})
+
+
+def _alone(independent: Any, counts: Any, samples: int | None) -> tuple[Any, int | None]:
+    """The counts and samples of an array without a CRN image. Raises InputError if it has one group."""
+    import numpy
+
+    shape = tuple(getattr(independent, "shape", ()))
+    if len(shape) == 4 and shape[0] == 1:
+        raise InputError("independent: found 1 group; at least 2 are needed, as their differences tell the noise "
+                         "(covary.denoise() takes a single image)")
+    if samples is None or counts is not None or len(shape) != 4:
+        return counts, samples
+    return numpy.full(shape[1:3], samples, numpy.uint32), None
 
 
 #: No image has more groups than this and fewer columns; arrays that seem to are [H, W, T, 3].
@@ -129,18 +152,21 @@ def check_options(estimator: str, options: Mapping[str, Any]) -> None:
 
 @dataclass(frozen=True)
 class InputReport:
-    """The findings of check_inputs(). Correlations are (value, standard error), or None if they cannot be measured."""
+    """The findings of check_inputs(). Correlations are (value, standard error), or None if they cannot be measured.
 
-    #: Why combine() refuses the images, and what to change in the renderer that made them.
+    errors, warnings, notes: why combine() refuses the images, and what to change in the renderer that made them.
+    crn_horizontal, crn_vertical, independent_horizontal, independent_vertical: rank correlation of the errors of
+        neighbours: 0.3 to 0.9 in a CRN image, 0 in an independent one.
+    crn_independent, crn_mean, independent_mean: rank correlation of the errors of the same pixel in both images: 0.
+    """
+
     errors: list[str]
     warnings: list[str]
     notes: list[str]
-    #: Rank correlation of the errors of neighbours: 0.3 to 0.9 in a CRN image, 0 in an independent one.
     crn_horizontal: tuple[float, float] | None
     crn_vertical: tuple[float, float] | None
     independent_horizontal: tuple[float, float] | None
     independent_vertical: tuple[float, float] | None
-    #: Rank correlation of the errors of the same pixel in both images: 0.
     crn_independent: tuple[float, float] | None
     crn_mean: float
     independent_mean: float

@@ -18,10 +18,10 @@ from typing import Any
 from . import _covary
 from ._arguments import checked, function, list_of, optional, path, text
 from ._cluster import CLIENT, SceneFiles, check_versions, dask, make_plugin, results
-from ._combine import Progress
-from ._program import program, run_program
+from ._program import failure, program, run_program
 from ._render import Scene
 from .errors import Error, UsageError
+from .progress import Counted
 
 
 @dataclass(frozen=True)
@@ -102,12 +102,12 @@ def _ask(*words: str | os.PathLike[str]) -> str:
     """The program's output. Raises Error with its message."""
     exit_code, output, errors = run_program("experiment", *words)
     if exit_code != 0:
-        raise (UsageError if exit_code == 2 else Error)(errors.strip().removeprefix("covary: "))
+        raise failure(exit_code, errors)
     return output
 
 
 def _make_runs(client: Any, pieces: Sequence[_Piece], cache: Path, program_hash: str,
-               progress: Progress | None) -> None:
+               progress: Counted | None) -> None:
     """Runs the parts on the workers, except those in the cache."""
     records = cache / "parts"
     records.mkdir(parents=True, exist_ok=True)
@@ -129,7 +129,7 @@ def _make_runs(client: Any, pieces: Sequence[_Piece], cache: Path, program_hash:
 @checked(client=CLIENT, suite=path, output=path, arguments=list_of(text, "a list of texts"),
          progress=optional(function))
 def experiment(client: Any, suite: str | os.PathLike[str], output: str | os.PathLike[str],
-               arguments: Sequence[str] = (), *, progress: Progress | None = None) -> Path:
+               arguments: Sequence[str] = (), *, progress: Counted | None = None) -> Path:
     """`covary experiment SUITE -o OUTPUT ARGUMENTS…` with its runs on the workers of a dask.distributed.Client.
     Returns the path of the report. Cached runs are not repeated, so the same call continues after an interruption.
 

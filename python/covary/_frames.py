@@ -12,9 +12,9 @@ from typing import Any
 from . import _covary
 from ._arguments import checked, function, list_of, optional, path, text, whole
 from ._cluster import CLIENT, check_versions, results
-from ._combine import Progress
-from ._program import program
-from .errors import Error, UsageError
+from ._program import failure, program
+from .errors import UsageError
+from .progress import Counted
 
 
 def _render_frame(words: tuple[str, ...], folder: str) -> tuple[int, str]:
@@ -49,7 +49,7 @@ def _path(name: str, frame: int) -> Path:
          progress=optional(function))
 def frames(client: Any, scene: str | os.PathLike[str], output: str | os.PathLike[str], first: int, last: int,
            options: Sequence[str] = (), *, waves: int = 1, seed: int = 0,
-           progress: Progress | None = None) -> list[Path]:
+           progress: Counted | None = None) -> list[Path]:
     """`covary render SCENE -o OUTPUT --frames FIRST-LAST OPTIONS…` with each frame on a worker of a
     dask.distributed.Client, in this process's folder, which all machines must share. Returns the paths of
     the frames, which have the bits of one machine. Frames that are complete are not rendered again, so that the same
@@ -76,7 +76,7 @@ def frames(client: Any, scene: str | os.PathLike[str], output: str | os.PathLike
              for frame in numbers for name, words in parts]
     for done, (frame, (code, errors)) in enumerate(results(client, _render_frame, tasks), 1):
         if code != 0:
-            raise (UsageError if code == 2 else Error)(f"frame {frame}: {errors.strip().removeprefix('covary: ')}")
+            raise failure(code, f"frame {frame}: {errors.strip().removeprefix('covary: ')}")
         if progress is not None:
             progress(done, len(tasks))
     return [_path(name, frame) for frame in numbers for name, _ in parts]

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import csv
-import hashlib
-import inspect
 import json
 import os
+import re
+import secrets
 import shlex
 import socketserver
 import sys
@@ -24,11 +24,14 @@ from typing import TYPE_CHECKING, Any
 
 from . import _covary
 from ._arguments import checked, either, function, instance, list_of, mapping_of, optional, path, text
+from ._combine import PROGRESS
+from ._identity import Unknown, identity_of
 from ._images import read_image
-from ._program import run_program
+from ._program import failure, run_program
 from ._result import AXES, new_axes
-from .errors import Error, InputError, UsageError
+from .errors import InputError, _warn
 from .film import Film
+from .progress import Line, Progress, ended, is_default, steps
 
 if TYPE_CHECKING:
     from ._result import FloatArray
@@ -39,18 +42,20 @@ _SOCKET = "COVARY_METHODS"
 
 @dataclass(frozen=True)
 class Samples:
-    """What a method of experiment() makes its image of."""
+    """What a method of experiment() makes its image of.
 
-    #: File of the mean of all samples, with the layers that were rendered; "" for renderers.
+    path: file of the mean of all samples, with the layers that were rendered; "" for renderers.
+    films: folder with the film of each pass; "" for renderers.
+    scene, seed, spp, seconds: the scene's file, the seed, and the samples per pixel, or seconds, of the budget.
+    frame, crop: width and height of the frame, and the part of it to make: x, y, width, height.
+    """
+
     path: str
-    #: Folder with the film of each pass; "" for renderers.
     films: str
-    #: The scene's file, the seed, and the samples per pixel, or seconds, of the budget.
     scene: str
     seed: int
     spp: int | None
     seconds: float | None
-    #: Width and height of the frame, and the part of it to make: x, y, width, height.
     frame: tuple[int, int] = (0, 0)
     crop: tuple[int, int, int, int] = (0, 0, 0, 0)
 
@@ -77,11 +82,13 @@ class Samples:
 
 @dataclass(frozen=True, repr=False)
 class Experiment:
-    """The results of experiment()."""
+    """The results of experiment().
 
-    #: With report.html, results.json and results.csv.
+    folder: with report.html, results.json and results.csv.
+    results: results.json (docs/file-formats.md).
+    """
+
     folder: Path
-    #: results.json (docs/file-formats.md).
     results: dict[str, Any] = field(repr=False)
 
     @property
@@ -154,8 +161,15 @@ class _Request(socketserver.StreamRequestHandler):
                 _make(server.methods[asked["name"]], asked["run"])
                 answer["processor_seconds"] = time.process_time() - before
         except Exception as error:  # noqa: BLE001  the experiment reports it as the method's failure
-            answer["error"] = f"{type(error).__name__}: {error}\n{traceback.format_exc()}"
+            answer["error"] = f"{_said(error)}\n{traceback.format_exc()}"
         self.wfile.write(json.dumps(answer).encode())
+
+
+def _said(error: Exception) -> str:
+    """In one line, with the place."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if Path(frame.filename).parent != _CALL.parent] or frames
+    return f"{type(error).__name__}: {error} ({Path(own[-1].filename).name}, line {own[-1].lineno})"
 
 
 def _make(method: Callable[[Samples], Any], run: dict[str, str]) -> None:
@@ -188,17 +202,31 @@ def _served(methods: Mapping[str, Callable[[Samples], Any]]) -> Iterator[None]:
                     os.environ[_SOCKET] = before
 
 
-def _source_hash(method: Callable[..., Any]) -> str:
-    """Of its source, so that a changed method is computed again. What it calls elsewhere does not count."""
-    try:
-        source = inspect.getsource(method)
-    except (OSError, TypeError):
-        source = repr(method)
-    return hashlib.sha256(source.encode()).hexdigest()[:16]
-
-
 def _program_of(name: str, method: Callable[..., Any]) -> str:
-    return f"{name}={shlex.join([sys.executable, '-I', str(_CALL), name, _source_hash(method)])}"
+    """With the function's identity, so that a changed one is computed again."""
+    try:
+        identity = identity_of(method, name)[:16]
+    except Unknown as unknown:
+        identity = secrets.token_hex(8)
+        _warn(f"methods: '{name}' is computed again each time, as changes of some value that it reads would not be "
+              f"seen: {unknown}")
+    return f"{name}={shlex.join([sys.executable, '-I', str(_CALL), name, identity])}"
+
+
+def _watcher(progress: Progress | None) -> Callable[[str], object] | None:
+    """What gets the program's lines, "[3/24, 0:10 left] room, iicv, …"."""
+    if is_default(progress):
+        return Line()
+    counted = steps(progress, "runs")
+    if counted is None:
+        return None
+
+    def count(text: str) -> None:
+        found = re.match(r"\[(\d+)/(\d+)", text)
+        if found:
+            counted(int(found[1]), int(found[2]))
+
+    return count
 
 
 _SUITE = "the name of a suite, the file of one or of a scene, or a suite as a dictionary"
@@ -207,11 +235,12 @@ _SUITE = "the name of a suite, the file of one or of a scene, or a suite as a di
 @checked(suite=either(_SUITE, instance(_SUITE, lambda value: isinstance(value, dict)), path), output=path,
          methods=optional(mapping_of(function, "a mapping from names to functions")),
          renderers=optional(mapping_of(function, "a mapping from names to functions")), scenes=optional(path),
-         options=optional(list_of(text, "a list of words of the program")))
+         options=optional(list_of(text, "a list of words of the program")), progress=PROGRESS)
 def experiment(suite: str | PathLike[str] | dict[str, Any], output: str | PathLike[str], *,
                methods: Mapping[str, Callable[[Samples], Any]] | None = None,
                renderers: Mapping[str, Callable[[Samples], Any]] | None = None,
-               scenes: str | PathLike[str] | None = None, options: list[str] | None = None) -> Experiment:
+               scenes: str | PathLike[str] | None = None, options: list[str] | None = None,
+               progress: Progress | None = None) -> Experiment:
     """Compares methods over scenes, budgets and seeds, as `covary experiment` does; methods may be Python functions.
 
     suite: the name of a built-in suite, a suite's or a scene's file, or a suite as a dictionary (docs/experiments.md).
@@ -219,11 +248,16 @@ def experiment(suite: str | PathLike[str] | dict[str, Any], output: str | PathLi
     methods: functions by name. Each gets Samples and returns an image, [H, W, 3], linear. A method of the suite says
         by "program": NAME what it renders for it; functions that none refers to get independent samples in eight
         groups, with auxiliary features. They are called one after the other, in another thread, and what they take
-        counts as their time. A function is computed again if its source has changed.
+        counts as their time. A function is computed again if its code has changed, or a value that it refers to or was
+        made with: globals, defaults, variables of the functions around it, functions of one's own that it calls. If
+        such a value cannot be told from others, it is computed again each time, with a warning. Files that it reads,
+        and versions of libraries that do not state one, do not count.
     renderers: the same for functions that make the image of the scene themselves, or have it: covary renders nothing
         for them, and their Samples have no image.
     scenes: folder of the suite's scenes; for a dictionary, by default the current folder.
     options: further words of the program, such as ["--quick"] or ["--spp", "16,64"].
+    progress: True for a line of text, the default on a terminal and in notebooks; False for none; or a function, called
+        with (done, total) runs.
 
     Raises InputError if runs failed, with their messages; those that did not are kept.
     """
@@ -238,8 +272,11 @@ def experiment(suite: str | PathLike[str] | dict[str, Any], output: str | PathLi
             file.write_text(json.dumps(suite), encoding="utf-8")
             words += ["--scenes", os.getcwd()] if scenes is None else []
             suite = file
-        code, _, errors = run_program("experiment", suite, "-o", output, "--quiet", *words, *(options or []))
+        watcher = _watcher(progress)
+        with ended(watcher):
+            code, _, errors = run_program("experiment", suite, "-o", output, *([] if watcher else ["--quiet"]), *words,
+                                          *(options or []), progress=watcher)
     if code:
-        raise {1: InputError, 2: UsageError}.get(code, Error)(errors.strip().removeprefix("covary: "))
+        raise failure(code, errors, InputError)
     made = Path(output)
     return Experiment(made, json.loads((made / "results.json").read_text(encoding="utf-8")))

@@ -71,6 +71,8 @@ def text_options(options: Mapping[str, OptionValue], estimator: str) -> dict[str
     texts: dict[str, str] = {}
     for keyword, value in options.items():
         name = keyword.replace("_", "-").rstrip("-")
+        if name not in known and not isinstance(value, (bool, int, float, str, type(None))):
+            raise UsageError(f"{keyword}: there is no such argument, nor an option of estimator {estimator!r}")
         taken = (_rule_of(known[name]) if name in known else optional(scalar))(keyword, value)
         if taken is not None and taken is not False:
             texts[name] = "" if taken is True else str(taken)

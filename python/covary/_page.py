@@ -7,17 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _covary
+from .progress import in_notebook
 
 if TYPE_CHECKING:
     from types import TracebackType
 
 HEIGHT = 900  # of the page in a notebook, in pixels
-
-
-def _in_notebook() -> bool:
-    ipython = sys.modules.get("IPython")
-    shell = ipython.get_ipython() if ipython else None
-    return shell is not None and hasattr(shell, "kernel")
 
 
 class LivePage:
@@ -36,7 +31,7 @@ class LivePage:
     @staticmethod
     def _show(address: str) -> None:
         """In the notebook, or, where there is none, its address."""
-        if not _in_notebook():
+        if not in_notebook():
             print(f"live: {address}", file=sys.stderr, flush=True)
             return
         display = sys.modules["IPython"].display

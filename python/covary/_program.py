@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import os
 import shutil
+import tempfile
+import threading
+from collections.abc import Callable
 from pathlib import Path
 
 from . import _covary
-from .errors import Error
+from .errors import Error, InputError, InternalError, IoError, UsageError
+
+_LOOK_SECONDS = 0.2
 
 
 def program() -> Path:
@@ -21,6 +26,44 @@ def program() -> Path:
     return Path(found)
 
 
-def run_program(*words: str | os.PathLike[str]) -> tuple[int, str, str]:
-    """Exit code, standard output and error of the program, which is ended if this process ends in any way."""
-    return _covary.run_program([str(program()), *(os.fspath(word) for word in words)])
+def run_program(*words: str | os.PathLike[str],
+                progress: Callable[[str], object] | None = None) -> tuple[int, str, str]:
+    """Exit code, standard output and error of the program, which is ended if this process ends in any way. `progress`
+    is called with its lines of progress, from another thread."""
+    command = ["/usr/bin/env", "COVARY_EXIT_CODES=1", str(program()), *(os.fspath(word) for word in words)]
+    if progress is None:
+        return _covary.run_program(command)
+    with tempfile.TemporaryDirectory(prefix="covary-progress-") as folder:
+        file = Path(folder) / "lines"
+        file.touch()
+        command.insert(1, f"COVARY_PROGRESS={file}")
+        end = threading.Event()
+        watcher = threading.Thread(target=_tell_lines, args=(file, progress, end), daemon=True)
+        watcher.start()
+        try:
+            return _covary.run_program(command)
+        finally:
+            end.set()
+            watcher.join()
+
+
+def _tell_lines(file: Path, progress: Callable[[str], object], end: threading.Event) -> None:
+    """Tells the newest line of the file, as often as there is one, until the end."""
+    told = ""
+    while True:
+        is_last = end.wait(_LOOK_SECONDS)
+        lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
+        if lines and lines[-1] != told:
+            told = lines[-1]
+            progress(told)
+        if is_last:
+            return
+
+
+#: Of exit codes; the last three as in sysexits.h.
+_CLASSES = {2: UsageError, 65: InputError, 74: IoError, 70: InternalError}
+
+
+def failure(code: int, errors: str, usual: type[Error] = Error) -> Error:
+    """The exception that stands for the program's exit code and messages."""
+    return _CLASSES.get(code, usual)(errors.strip().removeprefix("covary: "))

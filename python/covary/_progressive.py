@@ -21,19 +21,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Step:
-    """An image on the way, and what is known of its error."""
+    """An image on the way, and what is known of its error.
 
-    #: Linear Rec. 709, [H, W, 3]: the mean of the samples so far or, after an estimate, what it made of them.
+    image: Linear Rec. 709, [H, W, 3]: the mean of the samples so far or, after an estimate, what it made of them.
+    std_error: estimated standard error of each value, [H, W, 3]; None if there are too few samples to tell.
+    samples_per_pixel: over all passes, on average.
+    predicted_relmse: relMSE that the standard errors predict; None without them.
+    predicted_bounds: bounds between which the relMSE lies in 80 of 100 renders; None if they are not known.
+    result: of render(), in the last step; None before.
+    """
+
     image: FloatArray = field(repr=False)
-    #: Estimated standard error of each value, [H, W, 3]; None if there are too few samples to tell.
     std_error: FloatArray | None = field(repr=False)
-    #: Over all passes, on average.
     samples_per_pixel: float
-    #: relMSE that the standard errors predict; None without them.
     predicted_relmse: float | None
-    #: Bounds between which the relMSE lies in 80 of 100 renders; None if they are not known.
     predicted_bounds: tuple[float, float] | None
-    #: Of render(), in the last step; None before.
     result: RenderResult | None = field(repr=False, default=None)
 
 
@@ -45,7 +47,7 @@ class _Watcher:
     """render()'s `progress`, which also takes steps; the newest replaces one that was not fetched."""
 
     def __init__(self, progress: Any) -> None:
-        self._progress = _phases(progress)
+        self._progress = None if progress is None else _phases(progress)  # steps are seen, too
         self._changed = threading.Condition()
         self._step: Step | None = None
         self._closed = self._ended = False

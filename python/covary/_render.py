@@ -5,22 +5,21 @@ from __future__ import annotations
 import inspect
 import shlex
 import textwrap
-import warnings
 from collections.abc import Mapping
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, Union
 
 from . import _covary
 from ._arguments import (
-    check_names, checked, either, empty_or, flag, function, instance, mapping_of, optional, path, real, scalar, several,
-    text, whole,
+    check_names, check_some, checked, either, empty_or, flag, function, instance, mapping_of, optional, path, real,
+    scalar, several, text, whole,
 )
 from ._combine import DENOISE
 from ._options import DEFAULT, declared_rules, option_texts, text_options, underscored
 from ._page import LivePage
 from ._result import BadSample, RenderResult, text_of_bad_samples
-from .errors import BadSamplesWarning, UsageError
-from .progress import RenderProgress, _phases
+from .errors import BadSamplesWarning, UsageError, _warn
+from .progress import Line, Phases, RenderProgress, _phases, ended
 from .scenes import _file_of
 
 if TYPE_CHECKING:
@@ -140,6 +139,13 @@ def _check_together(given: Mapping[str, Any]) -> None:
 
     needs(("resume", "overwrite", "checkpoint"), ("output", "passes"), "output or passes")
     needs(("preview",), ("output",), "output")
+    if given["exposure"] is not None and not given["preview"]:
+        raise UsageError(f"exposure: found {given['exposure']!r} without preview=True, where it has no effect")
+    if given["estimator"] == "none" and given["denoise"] in (None, "none"):
+        for name, without in (("device", "cpu"), ("aov_samples", None)):
+            if given[name] != without and not (name == "aov_samples" and given["aovs"]):
+                raise UsageError(f"{name}: found {given[name]!r} with estimator='none', where it has no effect"
+                                 + (" without aovs=True" if name == "aov_samples" else ""))
     for first, second in (("resume", "overwrite"), ("until", "until_p95"),
                           ("until", "until_relative"), ("until_p95", "until_relative")):
         if given[first] and given[second]:
@@ -150,8 +156,17 @@ def _check_scene_arguments(scene: PathOrScene, options: Mapping[str, Any]) -> No
     """Raises UsageError for arguments of Scene.load() among the options."""
     found = sorted(set(options).intersection(Scene.load.rules))  # type: ignore[attr-defined]
     if found:
+        check_some(Scene.load, options)
         load = ", ".join([repr(getattr(scene, "path", scene)), *(f"{name}={options[name]!r}" for name in found)])
         raise UsageError(f"{', '.join(found)}: not of render(), but of Scene.load(): render(Scene.load({load}), …)")
+
+
+def _loaded(scene: PathOrScene, integrator: str, shown: Phases | None) -> Scene:
+    """The scene with the integrator."""
+    if isinstance(shown, Line):
+        shown(0, 0, "loading")
+    chosen = scene if isinstance(scene, Scene) else Scene.load(scene, integrator=integrator)
+    return chosen.with_integrator(integrator)
 
 
 _OPTIONS = declared_rules(_covary.render_options())
@@ -203,8 +218,9 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     live: shows the image, its error and the time left in the notebook, or in the browser at an address that is
         printed, with buttons; a number is the page's port. docs/live.md
     threads: at most so many processors; 0: all that set_threads() allows.
-    progress: True for a line of text, or a function, called up to 20 times a second with (done, total) samples; one of
-        three arguments also gets the phase, and is called from the beginning (covary.progress).
+    progress: True for a line of text, the default on a terminal and in notebooks; False for none; or a function, called
+        up to 20 times a second with (done, total) samples; one of three arguments also gets the phase, and is called
+        from the beginning (covary.progress).
     {declared}
     Ctrl-C ends the render within a tile; with `output` or `passes` samples are kept, and `resume=True` continues.
     """
@@ -213,11 +229,13 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     check_names(keywords, render.rules)  # type: ignore[attr-defined]
     _check_together({"resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "preview": preview,
                      "output": output, "passes": passes, "until": until, "until_p95": until_p95,
-                     "until_relative": until_relative})
+                     "until_relative": until_relative, "estimator": estimator, "denoise": denoise, "device": device,
+                     **{name: keywords.get(name) for name in ("exposure", "aov_samples", "aovs")}})
     declared = {name.replace("_", "-"): keywords.pop(name) for name in _DECLARED if name in keywords}
     texts = text_options(keywords, estimator or DEFAULT)
-    chosen = scene if isinstance(scene, Scene) else Scene.load(scene, integrator=integrator)
-    chosen = chosen.with_integrator(integrator)
+    shown = _phases(progress)
+    with ended(shown):
+        chosen = _loaded(scene, integrator, shown)
     if checkpoint is None:
         checkpoint = _CHECKPOINT_SECONDS if output is not None or passes is not None else 0
     loading = chosen._loading
@@ -232,10 +250,12 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     properties = {"min_depth": loading["min_depth"], "max_depth": loading["max_depth"], **loading["integrator_options"]}
     of_integrator = {name.replace("_", "-"): {"True": "on", "False": "off"}.get(str(value), str(value))
                      for name, value in properties.items() if value is not None}
-    with LivePage(live, chosen.path, None if output is None else fspath(output)) as page:
-        made = _covary.render(chosen._loaded, values, of_integrator, texts, films_only, threads,
-                              _phases(progress), page, getattr(progress, "step", None))
+    with LivePage(live, chosen.path, None if output is None else fspath(output)) as page, ended(shown):
+        made = _covary.render(chosen._loaded, values, of_integrator, texts, films_only, threads, shown, page,
+                              getattr(progress, "step", None))
     made["bad_samples"] = [_bad_sample(chosen, bad) for bad in made["bad_samples"]]
+    for text in made["warnings"]:
+        _warn(text)
     report_bad_samples(made)
     return RenderResult(**made)
 
@@ -246,12 +266,12 @@ render.__doc__ = inspect.cleandoc(render.__doc__ or "").replace("{declared}\n", 
     if underscored(option["name"]) in _DECLARED.keys() - inspect.signature(inspect.unwrap(render)).parameters) + "\n")
 
 
-def report_bad_samples(made: dict[str, Any], depth: int = 4) -> None:
-    """Warns about them at the caller's line, `depth` calls up, and adds the text to the result's warnings."""
+def report_bad_samples(made: dict[str, Any]) -> None:
+    """Warns about them, and adds the text to the result's warnings."""
     report = text_of_bad_samples(made["not_finite_samples"], made["negative_samples"], made["bad_samples"])
     if report:
         made["warnings"] = [*made["warnings"], report]
-        warnings.warn(report, BadSamplesWarning, stacklevel=depth)
+        _warn(report, BadSamplesWarning)
 
 
 def _bad_sample(scene: Scene, bad: dict[str, Any]) -> BadSample:

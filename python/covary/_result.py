@@ -39,33 +39,37 @@ def relmse_text(value: float | None, bounds: tuple[float, float] | None) -> str:
 
 @dataclass(frozen=True, repr=False)
 class Result:
-    """An image and what is known of its error. Its repr() is one line; in notebooks it shows the image."""
+    """An image and what is known of its error. Its repr() is one line; in notebooks it shows the image.
 
-    #: Linear Rec. 709, [H, W, 3].
+    image: Linear Rec. 709, [H, W, 3].
+    std_error: estimated standard error of each value, [H, W, 3]; None if the estimator has none, or was not asked for
+        it.
+    bias: estimated bias of each value where it is significant, positive if too bright, zero elsewhere, [H, W, 3]; None
+        if it is not known.
+    predicted_relmse: relMSE that the standard errors predict, relative to the image itself instead of a reference.
+    predicted_bounds: bounds between which the relMSE lies in 80 of 100 renders; None if they are not known, or cannot
+        be given.
+    prediction_doubt: why the prediction is not reliable, such as bounds farther than a factor of 1.5 from it, few
+        samples, or few pixels that hold most of the error; "" if it is.
+    warnings: warnings of the checks of the inputs, or of the render.
+    nonfinite_pixels: pixels with a value that is not finite in an input; they have the mean of their finite groups.
+    estimator: name and options of the estimator, as in `covary:estimator` of files.
+    samples_per_pixel: samples per pixel of all images together, on average; None if arrays do not know them.
+    aovs: further images by name, [H, W, 3]: layers, which add up to the image, and auxiliary images if they were asked
+        for or guided a denoiser: "Albedo", "N", "P", and "DenoisingAlbedo" and "DenoisingNormal", which are seen in
+        mirrors and through glass.
+    """
+
     image: FloatArray = field(repr=False)
-    #: Estimated standard error of each value, [H, W, 3]; None if the estimator has none, or was not asked for it.
     std_error: FloatArray | None = field(repr=False)
-    #: Estimated bias of each value where it is significant, positive if too bright, zero elsewhere, [H, W, 3]; None if
-    #: it is not known.
     bias: FloatArray | None = field(repr=False)
-    #: relMSE that the standard errors predict, relative to the image itself instead of a reference.
     predicted_relmse: float | None
-    #: Bounds between which the relMSE lies in 80 of 100 renders; None if they are not known, or cannot be given.
     predicted_bounds: tuple[float, float] | None
-    #: Why the prediction is not reliable, such as bounds farther than a factor of 1.5 from it, few samples, or few
-    #: pixels that hold most of the error; "" if it is.
     prediction_doubt: str
-    #: Warnings of the checks of the inputs, or of the render.
     warnings: list[str]
-    #: Pixels with a value that is not finite in an input; they have the mean of their finite groups.
     nonfinite_pixels: int
-    #: Name and options of the estimator, as in `covary:estimator` of files.
     estimator: str
-    #: Samples per pixel of all images together, on average; None if arrays do not know them.
     samples_per_pixel: float | None
-    #: Further images by name, [H, W, 3]: layers, which add up to the image, and auxiliary images if they were asked for
-    #: or guided a denoiser: "Albedo", "N", "P", and "DenoisingAlbedo" and "DenoisingNormal", which are seen in mirrors
-    #: and through glass.
     aovs: dict[str, FloatArray] = field(repr=False)
 
     @checked(path=path)
@@ -127,18 +131,22 @@ def fields_of(result: Result) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class BadSample:
-    """A sample whose value is not finite, or negative although it must not be. It counts as black."""
+    """A sample whose value is not finite, or negative although it must not be. It counts as black.
 
-    #: Name of its film in the result's `films`.
+    film: name of its film in the result's `films`.
+    x, y: its pixel in the full frame.
+    sample: its index in the pixel, or that of the light path if `light_path` is set.
+    value: red, green and blue.
+    light_path: whether it is one.
+    replay: the command that renders this sample alone and prints it.
+    """
+
     film: str
-    #: Its pixel in the full frame.
     x: int
     y: int
-    #: Its index in the pixel, or that of the light path if `light_path` is set.
     sample: int
     value: tuple[float, float, float]
     light_path: bool
-    #: The command that renders this sample alone and prints it.
     replay: str
 
     def __str__(self) -> str:
@@ -157,29 +165,35 @@ def text_of_bad_samples(not_finite: int, negative: int, samples: list[BadSample]
 
 @dataclass(frozen=True, repr=False)
 class RenderResult(Result):
-    """The result of a render."""
+    """The result of a render.
 
-    #: Films of the passes by name: "crn", "independent", …
+    films: films of the passes by name: "crn", "independent", …
+    render_seconds, estimate_seconds: of the passes and auxiliary images, and of what is made of them.
+    complete: whether all passes have the planned samples.
+    until_reached: whether the predicted error is at most the target; None without a target.
+    time_choice: after a time limit: what the clock decided, as options of the program, which make the same image again;
+        None without one, or if pixels may differ in their numbers of samples.
+    bias_share: for denoised images: the fraction of predicted_relmse that is squared bias; None for others.
+    risks: for denoised images: the relMSE that the mean of the samples and each denoised image alone would have had, by
+        name.
+    network: name and version of the neural network that was used; "" without one.
+    predicted_relmse_p95: the predicted error that 95 % of the blocks of 16 x 16 pixels do not exceed; None if
+        predicted_relmse is.
+    not_finite_samples, negative_samples: samples of all passes that were not finite, or negative although they must not
+        be. They count as black.
+    bad_samples: the first such samples of each pass, with the commands that replay them.
+    """
+
     films: dict[str, _covary.Film] = field(repr=False)
     render_seconds: float
     estimate_seconds: float
-    #: Whether all passes have the planned samples.
     complete: bool
-    #: Whether the predicted error is at most the target; None without a target.
     until_reached: bool | None
-    #: After a time limit: what the clock decided, as options of the program, which make the same image again; None
-    #: without one, or if pixels may differ in their numbers of samples.
     time_choice: str | None
-    #: For denoised images: the fraction of predicted_relmse that is squared bias, and by name the relMSE that the mean
-    #: of the samples and each denoised image alone would have had.
     bias_share: float | None
     risks: dict[str, float]
-    #: Name and version of the neural network that was used; "" without one.
     network: str
-    #: The predicted error that 95 % of the blocks of 16 x 16 pixels do not exceed; None if predicted_relmse is.
     predicted_relmse_p95: float | None
-    #: Samples of all passes that were not finite, or negative although they must not be. They count as black.
     not_finite_samples: int
     negative_samples: int
-    #: The first such samples of each pass, with the commands that replay them.
     bad_samples: list[BadSample]

@@ -12,13 +12,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ._arguments import (
-    Rule, check_names, checked, empty_or, flag, function, instance, optional, path, real, several, text, whole,
+    Rule, check_names, checked, empty_or, flag, instance, optional, path, real, several, text, whole,
 )
-from ._combine import DENOISE, Progress
+from ._combine import DENOISE, PROGRESS
 from ._options import DEFAULT, option_texts, text_options
-from ._program import run_program
+from ._program import failure, run_program
 from ._render import _DECLARED, FILTER, SEED, SPP, render
-from .errors import Error, UsageError
+from .errors import UsageError
+from .progress import Counted, Progress, steps
 from .scenes import _file_of
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def _frame_path(pattern: str, frame: int) -> Path:
     return Path(f"{pattern[:start - digits]}{frame:0{digits}}{pattern[start:]}")
 
 
-def _watch(files: list[Path], since: float, keeps: bool, progress: Progress,
+def _watch(files: list[Path], since: float, keeps: bool, progress: Counted,
            end: threading.Event) -> None:
     shown = -1
     while True:
@@ -74,7 +75,7 @@ def _watch(files: list[Path], since: float, keeps: bool, progress: Progress,
          resolution=optional(several("(width, height), each from 1 to 65536", whole(1, 65536), whole(1, 65536))),
          until=optional(real(0, above=True)), time=optional(real(0, above=True)), seed=SEED, denoise=DENOISE,
          oidn=empty_or(path), filter=FILTER, resume=flag, overwrite=flag, preview=flag,
-         threads=whole(0, 4096), progress=optional(function))
+         threads=whole(0, 4096), progress=PROGRESS)
 def render_frames(scene: str | PathLike[str], output: str | PathLike[str], frames: str | range,
                   spp: int | None = None, estimator: Estimator | None = None, *, integrator: str = "",
                   camera_path: str | PathLike[str] | None = None, fps: float | None = None, history: bool = False,
@@ -90,10 +91,11 @@ def render_frames(scene: str | PathLike[str], output: str | PathLike[str], frame
     camera_path: JSON with the camera's keys (docs/sequences.md); fps: frames per second of the path and of animations.
     history: mix in the previous frame where held-out samples prefer it.
     resume: keep complete frames, and continue; overwrite: replace frames that have other settings.
-    progress: called with (done, total) frames, from another thread.
+    progress: True for a line of text, the default on a terminal and in notebooks; False for none; or a function, called
+        with (done, total) frames, from another thread.
     Everything else is as in render(). Ctrl-C ends the frame in progress; complete ones stay.
 
-    Raises UsageError and Error with the messages of the program.
+    Raises what render() raises, with the messages of the program.
     """
     words, numbers = _numbers(frames)
     pattern = fspath(output)
@@ -111,9 +113,9 @@ def render_frames(scene: str | PathLike[str], output: str | PathLike[str], frame
     values.update(text_options(keywords, estimator or DEFAULT))
     arguments = [word for name, value in values.items() for word in ((f"--{name}", value) if value else (f"--{name}",))]
     files = [_frame_path(pattern, frame) for frame in numbers]
-    code, errors = _run([_file_of(fspath(scene)), *arguments, "--quiet"], files, resume, progress)
+    code, errors = _run([_file_of(fspath(scene)), *arguments, "--quiet"], files, resume, steps(progress, "frames"))
     if code:
-        raise (UsageError if code == 2 else Error)(_as_arguments(errors))
+        raise failure(code, _as_arguments(errors))
     return files
 
 
@@ -127,7 +129,7 @@ def _as_arguments(message: str) -> str:
 
 
 def _run(words: Iterable[str], files: list[Path], keeps: bool,
-         progress: Progress | None) -> tuple[int, str]:
+         progress: Counted | None) -> tuple[int, str]:
     """Exit code and messages of `covary render`."""
     if progress is None:
         code, _, errors = run_program("render", *words)

@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 from . import _covary, _cycles
 from ._arguments import checked, flag, function, instance, optional, text, whole
-from ._combine import Progress, check_options, combine
+from ._combine import check_options, combine
 from ._cycles import Group
 from ._options import DEFAULT, OptionValue
 from ._render import SEED, SPP
 from ._result import Result, fields_of
 from .errors import UsageError
 from .film import Film, film_from_groups
+from .progress import Counted
 
 if TYPE_CHECKING:
     from .estimators import PairEstimator
@@ -66,7 +67,7 @@ _SCENE = optional(instance("a bpy.types.Scene", lambda value: hasattr(value, "cy
 @checked(scene=_SCENE, spp=SPP, seed=SEED, groups=whole(3, _covary.most_groups), estimator=text, change=flag,
          progress=optional(function))
 def render(scene: Any = None, spp: int = 192, seed: int = 0, *, groups: int = 12, estimator: PairEstimator = DEFAULT,
-           change: bool = True, progress: Progress | None = None, **options: OptionValue) -> BlenderResult:
+           change: bool = True, progress: Counted | None = None, **options: OptionValue) -> BlenderResult:
     """Renders a Blender scene with Cycles and takes its noise out. By default all samples are independent, and the
     image is made as by covary.render(), guided by Cycles' albedo and normal; for estimators of two images, half of the
     samples have common random numbers. Afterwards, all settings of the scene are restored.
@@ -92,7 +93,7 @@ def render(scene: Any = None, spp: int = 192, seed: int = 0, *, groups: int = 12
     return _combined(images, spp, estimator, options, changed, time.perf_counter() - started)
 
 
-def _collect(groups: Iterator[dict[str, Any]], total: int, progress: Progress | None) -> dict[str, list[Any]]:
+def _collect(groups: Iterator[dict[str, Any]], total: int, progress: Counted | None) -> dict[str, list[Any]]:
     images: dict[str, list[Any]] = {}
     for done, made in enumerate(groups, 1):
         for name, image in made.items():

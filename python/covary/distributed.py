@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from . import _covary
 from ._arguments import array, check_some, checked, function, mapping_of, optional, path, real, text, whole
 from ._cluster import CLIENT, SceneFiles, check_versions, dask, make_plugin, results
-from ._combine import Progress, check_options, combine, guides_of
+from ._combine import check_options, combine, guides_of
 from ._experiment import experiment, main
 from ._frames import frames
 from ._options import DEFAULT, OptionValue, check_no_passes, estimators_of_films, option_texts, passes_of
@@ -31,6 +31,7 @@ from ._render import render as render_here
 from ._result import BadSample, RenderResult, Result, fields_of
 from .errors import Error, InputError, IoError, UsageError
 from .film import Film, merge_films
+from .progress import Counted
 
 if TYPE_CHECKING:
     from ._result import FloatArray
@@ -74,7 +75,8 @@ def _render_part(job: _Job, part: Part) -> Rendered | Error:
             _scenes[key]._path = job.path  # what commands name
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the caller tells them
-            made = render_here(_scenes[key], crop=part.crop, seed=part.seed, films_only=True, **job.settings)
+            made = render_here(_scenes[key], crop=part.crop, seed=part.seed, films_only=True, progress=False,
+                               **job.settings)
         told = made.warnings[:-1] if made.bad_samples else made.warnings  # the last is about them
         return Rendered(made.films, made.aovs, tuple(told), made.not_finite_samples, made.negative_samples,
                         tuple(made.bad_samples))
@@ -209,7 +211,8 @@ def _plan(scene: Scene, spp: int, estimator: str | None, seed: int, sample_range
               **{name: value for name, value in options.items() if name not in of_combine}}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        render_here(scene, crop=(0, 0, 1, 1), seed=seed, films_only=True, **passed)  # one pixel meets all the rest
+        # One pixel meets all the rest.
+        render_here(scene, crop=(0, 0, 1, 1), seed=seed, films_only=True, progress=False, **passed)
     places = [(crop, seed + r) for r in range(sample_ranges) for crop in _tiles(*scene.resolution, tile)]
     return _Plan(scene, estimator, dict(options), passed,
                  [Part(crop, own_seed, number) for number, (crop, own_seed) in enumerate(places)])
@@ -220,7 +223,7 @@ def _plan(scene: Scene, spp: int, estimator: str | None, seed: int, sample_range
          image_seconds=real(0), settings=optional(mapping_of(array, "a mapping from keywords of covary.render()")))
 def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimator: Estimator | None = None, *,
            seed: int = 0, sample_ranges: int = 1, tile: int = 128, folder: str | os.PathLike[str] | None = None,
-           progress: Progress | None = None, on_image: Callable[[FloatArray], object] | None = None,
+           progress: Counted | None = None, on_image: Callable[[FloatArray], object] | None = None,
            image_seconds: float = 5.0, settings: Mapping[str, Any] | None = None,
            **options: OptionValue) -> ClusterResult:
     """Renders on the workers of a dask.distributed.Client.
@@ -309,7 +312,7 @@ def _result(canvas: _Canvas, plan: _Plan, n_kept: int, seconds: float) -> Cluste
     given = fields_of(made) | {"warnings": list(canvas.warnings), "samples_per_pixel": samples,
                                "not_finite_samples": canvas.not_finite_samples,
                                "negative_samples": canvas.negative_samples, "bad_samples": canvas.bad_samples}
-    report_bad_samples(given, 5)
+    report_bad_samples(given)
     return ClusterResult(**given, films=films, parts=len(canvas.parts), parts_kept=n_kept, render_seconds=seconds)
 
 

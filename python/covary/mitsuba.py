@@ -8,13 +8,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ._arguments import checked, either, flag, function, instance, optional, path, text, whole
-from ._combine import Progress, check_options, combine, guides_of
+from ._combine import check_options, combine, guides_of
 from ._covary import most_groups
 from ._options import DEFAULT, OptionValue
 from ._render import SEED, SPP
 from ._result import Result, fields_of
 from .errors import UsageError
 from .film import Film, film_from_groups
+from .progress import Counted
 
 if TYPE_CHECKING:
     from ._result import FloatArray
@@ -272,7 +273,7 @@ _INTEGRATOR = optional(instance("an Integrator of Mitsuba, its name, or a dictio
 @checked(scene=_SCENE, spp=SPP, seed=SEED, integrator=_INTEGRATOR, sensor=whole(0), groups=whole(3, most_groups),
          estimator=text, aovs=flag, progress=optional(function))
 def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: int = 0, *, groups: int = 12,
-           estimator: PairEstimator = DEFAULT, aovs: bool = False, progress: Progress | None = None,
+           estimator: PairEstimator = DEFAULT, aovs: bool = False, progress: Counted | None = None,
            **options: OptionValue) -> MitsubaResult:
     """Renders a scene with Mitsuba and takes its noise out. By default all samples are independent, and the image is
     made as by covary.render(); for estimators of two images, half of the samples have common random numbers.

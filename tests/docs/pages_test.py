@@ -78,8 +78,7 @@ class Page:
         """All blocks of the page in one program; a block starts at its line, for messages."""
         if not self.python:
             return
-        for name in ("scene.xml", "room.xml"):
-            self.files.make(name)
+        self.files.make("scene.xml")  # the reader's own
         text, at = "", 1
         for block in self.python:
             text += "\n" * (block.line - at) + block.text

@@ -4,6 +4,7 @@ import array
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -96,6 +97,10 @@ class Package(unittest.TestCase):
         (self.work / "short").write_bytes(b"1234")
         with self.assertRaisesRegex(AssertionError, "combine_arrays: short: less than 108 floats"):
             self.run_in_folder(self.examples / "combine_arrays", 3, 3, 4, "short", "short", "out")
+        for given, message in (((-6, 3, 4), "WIDTH '-6': expected a whole number from 1 on"),
+                               ((3, 3, "x4"), "GROUPS 'x4': expected a whole number from 1 on")):
+            with self.assertRaisesRegex(AssertionError, message):
+                self.run_in_folder(self.examples / "combine_arrays", *given, "short", "short", "out")
 
     def test_rendering_gives_the_image_of_the_program(self):
         self.run_in_folder(self.prefix / "bin" / "covary", "render", ROOM, "-o", "a.exr", "--resolution", "120x80",
@@ -117,6 +122,21 @@ class Package(unittest.TestCase):
         self.assertAlmostEqual(float(printed.removeprefix("mean ")), 1.875, 5)
         with self.assertRaisesRegex(AssertionError, "`max-reflections` 'x': expected a whole number from 0 to 1000"):
             self.run_in_folder(program, "furnace.xml", "max-reflections=x")
+        with self.assertRaisesRegex(AssertionError, r"2\nexpected: own_integrator SCENE.xml \[max-reflections=N"):
+            self.run_in_folder(program, "furnace.xml", "maxreflections=3")
+
+    def test_an_integrator_of_the_caller_renders_every_scene(self):
+        """Every reflectance model: what one vertex needs does not add up along paths."""
+        shutil.copytree(SOURCE / "scenes", self.work / "scenes")
+        for name in ("box", "glossy-box", "room", "materials", "veil", "caustic"):
+            with self.subTest(name):
+                scene = self.work / "scenes" / f"{name}.xml"
+                text = scene.read_text()
+                for of, value in (("width", 24), ("height", 16), ("spp", 4)):
+                    text = re.sub(rf'(<default name="{of}" value=)"[^"]*"', rf'\1"{value}"', text)
+                scene.write_text(text)
+                printed = self.run_in_folder(self.examples / "own_integrator", scene, "max-reflections=8")
+                self.assertGreaterEqual(float(printed.removeprefix("mean ")), 0 if name == "caustic" else 0.01)
 
     def test_textures_are_read(self):
         """Through libcovary_imageio.so, which the library finds beside itself."""

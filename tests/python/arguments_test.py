@@ -88,7 +88,7 @@ BAD = {
     "covary.Result.save": {"path": ("x.webp", "x", None, *NO_PATH)},
     "covary.experiment": {"suite": (3, "quik", ""), "output": (None, *NO_PATH), "methods": (3, {"a": 3}),
                           "renderers": (3, {"a": 3}),
-                          "scenes": NO_PATH, "options": (3, "--quick", [3])},
+                          "scenes": NO_PATH, "options": (3, "--quick", [3]), "progress": NO_FUNCTION},
     "covary.Samples.layer": {"name": ("Albdo", *NO_TEXT)}, "covary.Samples.film": {"name": ("nothing", *NO_TEXT)},
     "covary.Result.plot": {"exposure": ("1", True, float("nan")), "axes": (3, "x")},
     "covary.Experiment.plot": {"axes": (3, "x")}, "covary.Result.to_dict": {},
@@ -266,6 +266,8 @@ class Arguments(PackageTest):
             message = self.message_of(covary.UsageError, covary.render, scene, 8, resolution=(24, 20))
             self.assertIn("resolution: not of render(), but of Scene.load(): render(Scene.load('", message)
             self.assertIn("room.xml', resolution=(24, 20)), …)", message)
+        self.assertIn("resolution: found '24x20' (str); expected (width, height)",
+                      self.message_of(TypeError, covary.render, ROOM, 8, resolution="24x20"))
 
     def test_rules_cover_the_arguments(self):
         from covary._arguments import checked, flag

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """experiment() with methods that are Python functions."""
+import inspect
+import sys
+import threading
 import unittest
 
 import covary
@@ -11,18 +14,32 @@ SUITE = {"name": "small", "scenes": [{"name": "room", "file": ROOM.name, "resolu
          "reference": {"spp": 64}}
 
 
+SEEN = []
+GAIN = [1.0]
+
+
+def log(fact):
+    """Past the function's identity, of which a list that it fills would be a part."""
+    getattr(sys.modules[__name__], "SEEN").append(fact)  # noqa: B009
+
+
+def scaled(samples, gain):
+    return gain * samples.image
+
+
 class Experiments(PackageTest):
     def experiment(self, suite=None, **methods):
         return covary.experiment(suite or SUITE, self.path / "out", methods=methods, scenes=ROOM.parent)
 
     def test_functions(self):
         """A method that returns the mean has the mean's error; each call gets its own samples, once."""
-        seen = []
+        seen = SEEN
+        seen.clear()
 
         def same(samples):
             film = samples.film()
-            seen.append((samples.seed, samples.spp, samples.seconds, film.groups.shape, samples.layer("N").shape,
-                         repr(samples)))
+            log((samples.seed, samples.spp, samples.seconds, film.groups.shape, samples.layer("N").shape,
+                 repr(samples)))
             numpy.testing.assert_allclose(film.mean, samples.image, rtol=1e-6)
             return samples.image
 
@@ -39,6 +56,41 @@ class Experiments(PackageTest):
         self.assertGreater(row["processor_seconds"], 0)
         self.experiment(same=same)
         self.assertEqual(len(seen), 2, "what is in the cache is not asked for again")
+
+    def test_changed_values(self):
+        """What a function was made with, and what it refers to, is a part of it."""
+        def by_closure(gain):
+            return lambda samples: scaled(samples, gain)
+
+        def by_global(gain):
+            GAIN[0] = gain
+            return lambda samples: scaled(samples, GAIN[0])
+
+        def errors(make):
+            return [next(row["relmse"] for row in self.experiment(mine=make(gain)).table if row["method"] == "mine")
+                    for gain in (1.0, 0.5)]
+
+        expected = errors(by_closure)
+        self.assertLess(expected[0], 0.15)
+        self.assertGreater(expected[1], 0.15, "half as bright")
+        self.assertEqual(errors(by_global), expected)
+
+    def test_unknown_values(self):
+        """What cannot be told from another is computed again, and said so."""
+        lock, seen = threading.Lock(), SEEN
+        seen.clear()
+
+        def locked(samples):
+            with lock:
+                log(samples.seed)
+                return samples.image
+
+        for _ in range(2):
+            with self.assertWarnsRegex(covary.CovaryWarning, "'locked' is computed again each time, .*: lock, a "
+                                                             r"_thread\.lock") as warned:
+                self.experiment(locked=locked)
+        self.assertEqual(seen, [1, 2, 1, 2])
+        self.assertEqual(warned.filename, __file__)
 
     def test_renderers(self):
         """covary renders nothing for them; they are told what of the scene to make."""
@@ -72,7 +124,8 @@ class Experiments(PackageTest):
         def wrong(samples):
             raise ValueError("no idea")
 
-        self.assertIn("room, wrong, 16 spp: ValueError: no idea",
+        line = inspect.getsourcelines(wrong)[1] + 1
+        self.assertIn(f"room, wrong, 16 spp: ValueError: no idea (laboratory_test.py, line {line})",
                       self.message_of(covary.InputError, self.experiment, wrong=wrong))
         self.assertIn("the shape [3]", self.message_of(covary.InputError, self.experiment,
                                                        flat=lambda samples: numpy.zeros(3)))

@@ -115,7 +115,6 @@ class Notebook(PackageTest):
 
     def test_notebooks(self):
         """Their cells, one after the other; the last shows a page."""
-        shutil.copy(ROOM, self.path / "room.xml")
         before = Path.cwd()
         os.chdir(self.path)
         self.addCleanup(os.chdir, before)

@@ -9,10 +9,21 @@
 #include <covary/estimators/iicv.h>
 #include <covary/risk/predicted_error.h>
 
+#include <charconv>
 #include <cstdio>
 #include <fstream>
 #include <string>
 #include <vector>
+
+/// The number in a word of the command line, from 1 on.
+int number_of(const char* name, const std::string& word) {
+  int number = 0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+  if (error != std::errc() || end != word.data() + word.size() || number < 1)
+    throw covary::Error(covary::ErrorCode::kUsage,
+                        std::string(name) + " '" + word + "': expected a whole number from 1 on");
+  return number;
+}
 
 std::vector<float> read_floats(const char* path, size_t count) {
   std::vector<float> values(count);
@@ -24,7 +35,8 @@ std::vector<float> read_floats(const char* path, size_t count) {
 
 int main(int argc, char** argv) try {
   if (argc != 7) return std::fprintf(stderr, "combine_arrays WIDTH HEIGHT GROUPS CRN INDEPENDENT OUT\n"), 2;
-  const int width = std::stoi(argv[1]), height = std::stoi(argv[2]), groups = std::stoi(argv[3]);
+  const int width = number_of("WIDTH", argv[1]), height = number_of("HEIGHT", argv[2]);
+  const int groups = number_of("GROUPS", argv[3]);
   const size_t count = static_cast<size_t>(width) * height * groups * 3;
   const std::vector<float> crn_means = read_floats(argv[4], count), independent_means = read_floats(argv[5], count);
 

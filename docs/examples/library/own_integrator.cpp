@@ -26,6 +26,7 @@ struct Reflections final : Integrator {
       for (uint32_t vertex = 1; ++context.n_rays, scene.intersect(ray, hit); ++vertex) {
         if (hit.emitter) sample.radiance += throughput * hit.emitter->surface_radiance(hit, -ray.d);
         const Vec3 wo = hit.frame.to_local(-ray.d);
+        context.arena.reset();  // its memory is for the closures of one vertex
         const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
         const BsdfSample next = bsdf->sample(wo, sample.random.get_1d(vertex, Event::kLobe),
                                              sample.random.get_2d(vertex, Event::kDirection));
@@ -39,9 +40,11 @@ struct Reflections final : Integrator {
 };
 
 int main(int argc, char** argv) try {
-  if (argc < 2) return std::fprintf(stderr, "own_integrator SCENE.xml [max-reflections=N]\n"), 2;
+  constexpr const char* kOption = "max-reflections=";
+  if (argc < 2 || argc > 3 || (argc == 3 && std::strncmp(argv[2], kOption, std::strlen(kOption)) != 0))
+    return std::fprintf(stderr, "expected: own_integrator SCENE.xml [max-reflections=N]\n"), 2;
   OptionValues given;
-  if (argc == 3 && std::strncmp(argv[2], "max-reflections=", 16) == 0) given["max-reflections"] = argv[2] + 16;
+  if (argc == 3) given["max-reflections"] = argv[2] + std::strlen(kOption);
   LoadOptions load;
   load.make_integrator = [&](Parameters& parameters) {
     if (parameters.type() != "reflections") parameters.ignore_rest();  // of the integrator that this one replaces
