@@ -29,10 +29,11 @@ class Refusals(PackageTest):
         self.assertIn("did you mean spp?", self.message_of(covary.UsageError, covary.render, "room", ssp=8))
 
     def test_without_effect(self):
+        of_none = {"estimator": "none"}
         for arguments, message in (({"exposure": 1}, "exposure: found 1.0 without preview=True, where it has no effect"),
-                                   ({"estimator": "none", "aov_samples": 4}, "aov_samples: found 4 with estimator='none', "
-                                    "where it has no effect without aovs=True"),
-                                   ({"estimator": "none", "device": "auto"}, "device: found 'auto' with")):
+                                   ({**of_none, "aov_samples": 4}, "aov_samples: found 4 with estimator='none', where "
+                                                                   "it has no effect without aovs=True"),
+                                   ({**of_none, "device": "auto"}, "device: found 'auto' with estimator='none'")):
             self.assertIn(message, self.message_of(covary.UsageError, covary.render, "room", 4, **arguments))
 
     def test_images_alone(self):
