@@ -13,6 +13,7 @@
 #include "film/output_file.h"
 #include "film/outputs.h"
 #include "formats/file_resolver.h"
+#include "io/scene_formats.h"
 #include "method_options.h"
 #include "plans/integrator_choice.h"
 #include "value_names.h"
@@ -91,10 +92,10 @@ void convert_scene(const ConvertSceneOptions& options) {
 
 void add_convert_scene(CLI::App& app) {
   const auto o = std::make_shared<ConvertSceneOptions>();
-  CLI::App* command =
-      app.add_subcommand("convert-scene", "Convert pbrt-v4, glTF 2.0 or older Mitsuba scenes to Mitsuba 3 XML");
+  CLI::App* command = app.add_subcommand("convert-scene",
+                                         "Convert a scene of another format, or of an older Mitsuba, to Mitsuba 3 XML");
   add_value(*command, "SCENE", o->input, kFileValue,
-            "pbrt-v4 (.pbrt), glTF 2.0 (.glb, .gltf) or Mitsuba scene of any version (.xml)")
+            fmt::format("Scene: {}, of any version ({})", scene_format_names(), scene_file_endings()))
       ->option_text("SCENE")
       ->required();
   add_value(*command, "OUT", o->output, kFileValue,

@@ -15,7 +15,7 @@
 #include "core/error.h"
 #include "declared_options.h"
 #include "experiment_run.h"
-#include "io/scene_file.h"
+#include "io/scene_formats.h"
 #include "json_output.h"
 #include "lab/suite.h"
 #include "numbers.h"

@@ -14,7 +14,7 @@
 #include "device/device_info.h"
 #include "film/pictures.h"
 #include "io/load_scene.h"
-#include "io/scene_file.h"
+#include "io/scene_formats.h"
 #include "json_output.h"
 #include "method_options.h"
 #include "plans/integrator_choice.h"
@@ -162,7 +162,7 @@ void add_info(CLI::App& app) {
   const auto options = std::make_shared<InfoOptions>();
   CLI::App* command = app.add_subcommand("info", "Describe a film, image or scene: size, channels, attributes");
   const CLI::Option* file = add_value(*command, "FILE", options->path, kFileValue,
-                                      "A film or image, or a scene file (.xml, .pbrt, .glb, .gltf)");
+                                      fmt::format("A film or image, or a scene file ({})", scene_file_endings()));
   add_scene_options(*command, options->scene_options);
   command->add_flag("--devices", options->devices, "Instead, the GPUs and other devices that --device takes");
   command->add_flag("--json", options->json, "One JSON object");

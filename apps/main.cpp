@@ -26,7 +26,7 @@
 #include "core/shell_text.h"
 #include "core/unfinished.h"
 #include "interruption.h"
-#include "io/scene_file.h"
+#include "io/scene_formats.h"
 #include "method_options.h"
 #include "version.h"
 

@@ -20,6 +20,7 @@
 #include "film/output_file.h"
 #include "film/outputs.h"
 #include "interruption.h"
+#include "io/scene_formats.h"
 #include "json_output.h"
 #include "live.h"
 #include "method_options.h"
@@ -261,7 +262,8 @@ void render(RenderOptions options) {
 
 void add_render(CLI::App& app) {
   const auto o = std::make_shared<RenderOptions>();
-  CLI::App* command = app.add_subcommand("render", "Render a scene (Mitsuba XML, pbrt, glTF) into an image (EXR)");
+  CLI::App* command =
+      app.add_subcommand("render", fmt::format("Render a scene ({}) into an image (EXR)", scene_format_names(", ")));
   add_render_options(*command, *o);
   command->callback([o] { render(*o); });
 }

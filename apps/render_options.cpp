@@ -14,7 +14,7 @@
 #include "commands.h"
 #include "core/error.h"
 #include "declared_options.h"
-#include "io/scene_file.h"
+#include "io/scene_formats.h"
 #include "method_options.h"
 #include "numbers.h"
 #include "passes/light_pass.h"
@@ -88,7 +88,7 @@ LoadedScene load(const RenderOptions& options) {
   LoadOptions loading = load_options(options.scene_options);
   loading.width = options.settings.width, loading.height = options.settings.height;
   loading.view = options.settings.view;
-  if (is_gltf_file(options.scene)) loading.time = time_of_frame(options);
+  if (scene_format_of(options.scene).moves_in_seconds) loading.time = time_of_frame(options);
   loading.make_integrator = integrator_maker({options.settings.integrator, options.of_integrator});
   LoadedScene scene = load_scene(options.scene, loading);
   check_integrator(options, scene);
@@ -168,7 +168,9 @@ std::string scene_file(const std::string& word) {
 std::string program_path() { return fs::read_symlink("/proc/self/exe").string(); }
 
 void add_render_options(CLI::App& command, RenderOptions& o) {
-  command.add_option("SCENE", o.scene, "Scene: Mitsuba XML, pbrt or glTF; or the name of a built-in one, such as room")
+  command
+      .add_option("SCENE", o.scene,
+                  fmt::format("Scene: {}; or the name of a built-in one, such as room", scene_format_names()))
       ->transform(scene_file)
       ->required();
   add_options(command, options_of<RenderSettings>(), o.values);

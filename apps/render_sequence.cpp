@@ -17,7 +17,7 @@
 #include "core/stopwatch.h"
 #include "core/unfinished.h"
 #include "film/image_file.h"
-#include "io/scene_file.h"
+#include "io/scene_formats.h"
 #include "passes/motion.h"
 #include "plans/budget.h"
 #include "plans/camera_path.h"
@@ -93,7 +93,7 @@ bool is_complete(const std::string& path, const std::string& made_of) {
                   path, earlier.empty() ? "no record of its settings" : differences(earlier, made_of)));
 }
 
-constexpr double kGltfRate = 24;  // whose animations are in seconds
+constexpr double kRateInSeconds = 24;  // of formats whose animations are in seconds
 
 /// The times of frames, and the camera's place at each.
 class FrameTimes {
@@ -102,10 +102,10 @@ class FrameTimes {
   explicit FrameTimes(const RenderOptions& options) {
     const SequenceSettings& sequence = options.sequence;
     if (!sequence.camera_path.empty()) path_ = read_camera_path(sequence.camera_path);
-    rate_ = sequence.frames_per_second > 0 ? sequence.frames_per_second
-            : path_                        ? path_->frames_per_second()
-            : is_gltf_file(options.scene)  ? kGltfRate
-                                           : 1;
+    rate_ = sequence.frames_per_second > 0                    ? sequence.frames_per_second
+            : path_                                           ? path_->frames_per_second()
+            : scene_format_of(options.scene).moves_in_seconds ? kRateInSeconds
+                                                              : 1;
   }
 
   double time(int frame) const { return frame / rate_; }

@@ -33,8 +33,7 @@ class DirectIntegrator final : public Integrator {
     if (lengths_.max_depth <= 0) return;
     PathBatch& batch = context.state_as<PathBatch>();
     const UniformLights lights(scene);
-    batch.start(samples.size());
-    for (uint32_t i = 0; i < samples.size(); ++i) batch.rays[i] = samples[i].ray, batch.paths[i].sample = i;
+    start_paths(samples, batch);
     find_surfaces(scene, 0, lengths_.hide_emitters, batch, context);
     if (lengths_.min_depth <= 1)
       for (size_t i = 0; i < batch.paths.size(); ++i)
@@ -54,11 +53,10 @@ class DirectIntegrator final : public Integrator {
 
  private:
   Spectrum seen_directly(const Scene& scene, const PathBatch& batch, size_t i) const {
-    const Vec3& d = batch.rays[i].d;
-    if (batch.paths[i].found)
-      return batch.hits[i].emitter ? batch.hits[i].emitter->surface_radiance(batch.hits[i], -d) : Spectrum();
-    if (scene.background()) return scene.background()->environment(d).radiance;
-    return scene.environment() && !lengths_.hide_emitters ? scene.environment()->environment(d).radiance : Spectrum();
+    const PathState& path = batch.paths[i];
+    const SurfaceHit& hit = batch.hits[i];
+    const Emitter* emitter = emitter_met(path, hit, scene, scene.environment(), lengths_.hide_emitters);
+    return emitter ? light_met(*emitter, path, batch.rays[i], hit).radiance : Spectrum();
   }
 
   const BsdfClosure& bind(const SurfaceHit& hit, const Vec3& wo, PathContext& context) const {

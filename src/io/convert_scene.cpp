@@ -14,7 +14,7 @@
 #include "formats/object_builder.h"
 #include "imageio/png.h"
 #include "io/media.h"
-#include "io/scene_file.h"
+#include "io/scene_formats.h"
 #include "scene/embedded_data.h"
 #include "textures/image.h"
 
@@ -223,7 +223,7 @@ ConvertedScene convert_scene(const std::string& path, const std::string& output,
   const FileView file(path);
   Diagnostics diagnostics;
   FileResolver files;
-  const SceneXml xml = read_scene_file(file.text(), path, options.defines, files, diagnostics);
+  const SceneXml xml = read_scene_file({file.text(), path, options.defines, {}}, files, diagnostics);
   const auto find_file = [&](const std::string& name, const SourceLocation& where) {
     return files.resolve(name, where, diagnostics);
   };

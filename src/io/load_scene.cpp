@@ -17,7 +17,7 @@
 #include "io/media.h"
 #include "io/nested_integrator.h"
 #include "io/object_factory.h"
-#include "io/scene_file.h"
+#include "io/scene_formats.h"
 #include "io/scene_jobs.h"
 #include "io/sensor.h"
 #include "io/shapes.h"
@@ -33,9 +33,9 @@ class Loader {
 
   void load(std::string_view text, const std::string& name) {
     const Stopwatch watch;
-    xml_ = read_scene_file(text, name, options_.defines, files_, diagnostics_, options_.time);
+    xml_ = read_scene_file({text, name, options_.defines, options_.time}, files_, diagnostics_);
     result_.is_animated = xml_.is_animated;
-    is_gltf_ = is_gltf_file(name);
+    is_model_ = scene_format_of(name).holds_models;
     sensor_ = chosen_sensor(*xml_.scene, options_.view, diagnostics_);
     jobs_.collect(*xml_.scene);
     jobs_.run(diagnostics_);
@@ -74,7 +74,7 @@ class Loader {
     jobs_.append_diagnostics_of_shapes(diagnostics_);
     degenerate_.tell(diagnostics_);
     if (!sensor_ && !diagnostics_.has_errors())
-      diagnostics_.error(xml_.scene->where, is_gltf_ ? "no triangles, and no camera" : "the scene has no sensor");
+      diagnostics_.error(xml_.scene->where, is_model_ ? "no triangles, and no camera" : "the scene has no sensor");
     if (sensor_made_) set_up_camera(*sensor_made_);
   }
 
@@ -82,22 +82,22 @@ class Loader {
   void complete_view() {
     const SceneView& view = options_.view;
     const SourceLocation where{xml_.scene->where.file, 0, 0};
-    Orientation orientation = orientation_of(is_gltf_ || !sensor_made_ ? nullptr : &sensor_made_->camera);
+    Orientation orientation = orientation_of(is_model_ || !sensor_made_ ? nullptr : &sensor_made_->camera);
     const Bounds3 bounds = bounds_of(parts_);
     if (!sensor_ && !bounds.empty() && (view.camera == "auto" || view.camera.empty())) {
       const ObjectPtr like = first_sensor(*xml_.scene);
       const auto made = like ? std::dynamic_pointer_cast<const SensorSettings>(factory_.make(like)) : nullptr;
-      if (!is_gltf_ && made) orientation = orientation_of(&made->camera);
+      if (!is_model_ && made) orientation = orientation_of(&made->camera);
       const float aspect = aspect_of(made.get(), options_.width, options_.height);
-      sensor_ = !is_gltf_ && view.camera.empty() ? default_sensor(*xml_.scene, bounds, diagnostics_)
-                                                 : framed_sensor(bounds, orientation, like.get(), aspect, where);
+      sensor_ = !is_model_ && view.camera.empty() ? default_sensor(*xml_.scene, bounds, diagnostics_)
+                                                  : framed_sensor(bounds, orientation, like.get(), aspect, where);
       sensor_made_ = std::dynamic_pointer_cast<const SensorSettings>(factory_.make(sensor_));
       result_.added.push_back(sensor_);
-      if (is_gltf_ && view.camera.empty()) diagnostics_.warn(where, kFramed);
+      if (is_model_ && view.camera.empty()) diagnostics_.warn(where, kFramed);
     }
     result_.sensor = sensor_;
     if (!sensor_made_) return;
-    const Surroundings around = surroundings(view, parts_, sensor_made_->camera, orientation, is_gltf_, where);
+    const Surroundings around = surroundings(view, parts_, sensor_made_->camera, orientation, is_model_, where);
     for (const ObjectPtr& object : around.objects) {
       if (object->kind == "shape") jobs_.make_shape(object);
       place(object);
@@ -379,7 +379,7 @@ class Loader {
   };
   DefaultBsdf default_bsdfs_[2];  // of non-emissive and emissive shapes
   ObjectPtr sensor_, integrator_, environment_;
-  bool is_gltf_ = false;
+  bool is_model_ = false;
   std::shared_ptr<const SensorSettings> sensor_made_;
   std::map<const Shape*, std::string> names_;  // place in the file and type
   DegenerateTriangles degenerate_;

@@ -12,7 +12,7 @@
 #include "core/random.h"
 #include "formats/file_resolver.h"
 #include "io/convert_scene.h"
-#include "io/scene_file.h"
+#include "io/scene_formats.h"
 #include "scene/embedded_data.h"
 #include "support/files.h"
 
@@ -33,7 +33,7 @@ class SceneWriter : public ::testing::Test {
     const FileView file(path);
     Diagnostics diagnostics;
     FileResolver files;
-    const SceneXml xml = read_scene_file(file.text(), path, {}, files, diagnostics);
+    const SceneXml xml = read_scene_file({file.text(), path, {}, {}}, files, diagnostics);
     diagnostics.throw_if_errors();
     return xml.scene;
   }
