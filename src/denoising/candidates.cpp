@@ -186,15 +186,6 @@ CandidateMaker::Make one_by_one(std::function<std::vector<Image>(const Candidate
   };
 }
 
-FilterKinds kinds_for(double samples, bool with_network, bool with_history) {
-  // Without a network, from so many samples per pixel on, NL-means of the image itself is worth its time beside the
-  // regression; measured (docs/notes/denoising.md). With history it always is: candidates that differ show how wrong a
-  // frame is, which limits what previous frames may change (docs/notes/sequences.md).
-  constexpr double kManySamples = 64;
-  if (with_network) return FilterKinds::kNlMeans;
-  return samples >= kManySamples || with_history ? FilterKinds::kAll : FilterKinds::kRegression;
-}
-
 RegressionGuides regression_guides(const Guides& guides, FilterKinds kinds) {
   RegressionGuides result;
   if (!guides.albedo || kinds == FilterKinds::kNlMeans) return result;

@@ -37,6 +37,8 @@ struct CandidateInput {
   int part = 0;  ///< all samples; 1, 2: the halves
 };
 
+struct CandidateSet;  // mixture.h
+
 /// Makes the same kinds of candidates from any set of samples.
 struct CandidateMaker {
   /// The candidates of each set of samples: all samples, both halves, or all of these. All sets have the same valid
@@ -56,6 +58,8 @@ struct CandidateMaker {
   std::function<int()> runs;  ///< number of network runs so far; empty without a network
   /// Index of the candidate to show if there are too few samples to compare candidates.
   int best_of_few = 0;
+  /// In place of `make`: the shares in this candidate of the image and of the candidates before it.
+  std::function<Planes(const CandidateInput&, const CandidateSet&)> shares;
 };
 
 /// Makes the candidates of each set of samples on its own.
@@ -67,8 +71,8 @@ enum class CandidateBase { kPair, kMean };
 /// NL-means of the image and of the image over its albedo; for a mean with albedo, regression.h in place of the former,
 /// or all three. The regression gains next to nothing if a network's candidates are mixed in too.
 enum class FilterKinds { kNlMeans, kRegression, kAll };
-/// Those for a mean of so many samples per pixel, with or without a network and previous frames.
-FilterKinds kinds_for(double samples, bool with_network, bool with_history = false);
+/// Those of the default, for a mean.
+inline FilterKinds kinds_of_mean(bool with_network) { return with_network ? FilterKinds::kNlMeans : FilterKinds::kAll; }
 /// Scales of differences of albedos and normals, and bandwidths of the sharp and the smooth filter.
 inline constexpr float kAlbedoUnit = 0.07f, kNormalUnit = 0.2f, kSharpBandwidth = 0.5f, kSmoothBandwidth = 1;
 /// What the regression fits the image to; nothing if it is not used, or if there is no albedo.

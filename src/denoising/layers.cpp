@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 
 #include "core/error.h"
 #include "core/parallel.h"
 #include "denoising/limited_groups.h"
+#include "weighing/weighing.h"
 
 namespace covary {
 namespace {
@@ -28,6 +30,18 @@ Image mean_of(const GroupedImage& layer, const GroupedImage& picture, const Grou
     });
   }
   return mean_image(moments(view, valid, 0, 0.0f));
+}
+
+/// The weights of the candidates before one that consists of them; empty if there is none.
+std::vector<Image> weights_of_made(const LayersInput& in) {
+  std::vector<Image> weights;
+  if (!in.shares || in.shares->count() == 0) return weights;
+  for (size_t p = 0; p + 1 < in.weights.size(); ++p) {
+    weights.push_back(share_of(*in.shares, static_cast<int>(p) + 1, in.weights.back()));
+    std::transform(weights[p].data.begin(), weights[p].data.end(), in.weights[p].data.begin(), weights[p].data.begin(),
+                   std::plus<>());
+  }
+  return weights;
 }
 
 }  // namespace
@@ -56,13 +70,16 @@ std::vector<Image> denoise_layers(const LayersInput& in) {
   }
   const std::vector<Image> means = result;
   size_t p = 0;
+  const std::vector<Image> shared = weights_of_made(in);
+  const std::span<const Image> of_candidates = shared.empty() ? in.weights : std::span(shared);
   for (const CandidateMaker& maker : in.makers)
-    for (const std::vector<Image>& candidate : maker.make_layers(in.candidates, without_fireflies)) {
-      const std::vector<float>& weights = in.weights[p++].data;
-      for (size_t k = 0; k < result.size(); ++k)
-        for (size_t i = 0; i < result[k].data.size(); ++i)
-          if (valid[i / 3]) result[k].data[i] += weights[i / 3] * (candidate[k].data[i] - means[k].data[i]);
-    }
+    if (maker.make_layers)
+      for (const std::vector<Image>& candidate : maker.make_layers(in.candidates, without_fireflies)) {
+        const std::vector<float>& weights = of_candidates[p++].data;
+        for (size_t k = 0; k < result.size(); ++k)
+          for (size_t i = 0; i < result[k].data.size(); ++i)
+            if (valid[i / 3]) result[k].data[i] += weights[i / 3] * (candidate[k].data[i] - means[k].data[i]);
+      }
   std::map<int, std::vector<Image*>> sums;
   for (size_t k = 0; k < result.size(); ++k)
     if (in.layers[k].sum != Layer::kNoSum) sums[in.layers[k].sum].push_back(&result[k]);

@@ -30,6 +30,7 @@ struct LayersInput {
   CandidateInput candidates;  ///< the inputs of the picture's candidates
   std::span<const CandidateMaker> makers;
   std::span<const Image> weights;  ///< of the picture, for the candidates of all makers
+  const Planes* shares = nullptr;  ///< CandidateSet::shares of the picture
 };
 
 /// The layers, in their order.

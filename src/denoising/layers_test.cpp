@@ -4,10 +4,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "denoising/mixed_denoising.h"
+#include "denoising/weighed_candidate.h"
 #include "estimators/test_images.h"
 
 namespace covary {
@@ -87,6 +89,31 @@ TEST(Layers, OfANetworkAddUp) {
   expect_sum(mixed.result.estimate, mixed.result.layers);
   for (const Image& layer : mixed.result.layers)
     for (const float v : layer.data) ASSERT_GE(v, 0);
+}
+
+/// Filters with given weights and shares are linear, so that layers add up without help.
+TEST(Layers, OfACandidateThatConsistsOfOthersAddUpWithoutHelp) {
+  const Scene scene;
+  Image albedo(kWidth, kHeight, 3);
+  std::fill(albedo.data.begin(), albedo.data.end(), 0.5f);
+  Guides guides;
+  guides.albedo = &albedo;
+  std::vector<CandidateMaker> makers = {filtered_candidates(guides, CandidateBase::kMean, FilterKinds::kAll)};
+  add_weighing_maker(guides, makers);
+  ASSERT_EQ(makers.size(), 2u);
+  std::vector<Layer> layers = scene.layers();
+  for (Layer& layer : layers) layer.sum = Layer::kNoSum;  // they are not made to add up
+  const DenoisingParts parts = parts_of_mean(scene.view(scene.all));
+  const MixedDenoising mixed = denoise_by_mixture(parts, makers, DenoiseMode::kAuto, false, layers);
+  double weight = 0;
+  for (const float w : mixed.weights.back().data) weight += w;
+  EXPECT_GT(weight, 0.01 * kWidth * kHeight) << "the candidate has a part";
+  double missing = 0, all = 0;
+  for (size_t i = 0; i < mixed.result.estimate.data.size(); ++i) {
+    const float sum = mixed.result.layers[0].data[i] + mixed.result.layers[1].data[i];
+    missing += std::abs(sum - mixed.result.estimate.data[i]), all += mixed.result.estimate.data[i];
+  }
+  EXPECT_LT(missing, 0.02 * all);
 }
 
 TEST(Layers, OfAPictureWithoutOthersThanBlackOnesShareIt) {

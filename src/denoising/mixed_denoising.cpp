@@ -17,6 +17,7 @@
 #include "denoising/mixture.h"
 #include "denoising/parts_mixture.h"
 #include "denoising/rows_denoising.h"
+#include "denoising/weighed_candidate.h"
 #include "risk/plain_mean.h"
 
 namespace covary {
@@ -47,7 +48,7 @@ std::vector<Image> layers_of(const DenoisingParts& parts, const std::vector<Cand
   if (layers.empty()) return {};
   const Image h = mean_image(parts.whole.independent);
   return denoise_layers({&mixture.result.estimate, &parts.groups, layers, input_of(parts.whole, h, parts.valid), makers,
-                         mixture.weights});
+                         mixture.weights, &mixture.shares});
 }
 
 int runs_of(const std::vector<CandidateMaker>& makers) {
@@ -123,8 +124,7 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
   const PartsWeighting chosen = settings_of(mode).weighting;
   const bool has_history = history.before || history.keep_samples;
   MixedParts mixed = mix_parts(parts, makers, chosen);
-  MixedDenoising out;
-  out.names = names_of(makers);
+  MixedDenoising out{.result = {}, .names = names_of(makers), .candidates = {}, .weights = {}, .shares = {}};
   MethodImage& result = out.result;
   result = finish(mixed_rows(parts, mixed, makers, std_error || has_history), makers, parts.name);
   if (has_history) {  // last: the error above is that of the frame alone
@@ -132,7 +132,7 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
     result.estimate = std::move(mixed.mixture.image);
   }
   if (!std_error) result.std_error = {}, result.bias = {}, result.risk_rows.clear(), result.risks.reset();
-  out.weights = std::move(mixed.mixture.weights);
+  out.weights = std::move(mixed.mixture.weights), out.shares = std::move(mixed.whole.shares);
   out.candidates = std::move(mixed.whole.candidates);
   result.layers = layers_of(parts, makers, out, layers);
   result.network_runs = runs_of(makers);
@@ -154,8 +154,7 @@ MixedDenoising single_candidate(const GroupedImage& independent, const std::vect
                                 std::span<const Layer> layers) {
   DenoisingParts parts = whole_of_mean(independent);
   CandidateSet set = std::move(candidates_of({&parts.whole}, parts.valid, makers)[0]);
-  MixedDenoising out;
-  out.names = names_of(makers);
+  MixedDenoising out{.result = {}, .names = names_of(makers), .candidates = {}, .weights = {}, .shares = {}};
   const size_t best = static_cast<size_t>(makers[0].best_of_few);
   out.result = parts.whole.image;
   out.result.std_error = Image();
@@ -218,12 +217,13 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
   return [=](const Samples& samples, const MethodSettings& settings, bool stages) {
     const GroupedImage& independent = samples.independent;
     check_guides(settings.guides);
-    const FilterKinds kinds = kinds_for(mean_samples(independent), with_oidn, options.history.before != nullptr);
+    const FilterKinds kinds = kinds_of_mean(with_oidn);
     const auto here = [&]() -> MixedDenoising {
       std::vector<CandidateMaker> makers;
       if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn, CandidateBase::kMean));
       makers.push_back(filtered_candidates(settings.guides, CandidateBase::kMean, kinds));
       if (!can_be_mixed(independent)) return single_candidate(independent, makers, settings.layers);
+      add_weighing_maker(settings.guides, makers);
       return denoise_frame(parts_of_mean(independent), makers, options, settings, settings.layers);
     };
     if (!options.mix_mean) return here();
@@ -244,7 +244,7 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
 }
 
 /// The same for images in rows, without history and layers.
-RowsMethod rows_of_mean(const MixedDenoisingOptions& options) {
+RowsMethod rows_of_mean(bool with_oidn) {
   RowsMethod method;
   method.reach_of_parts = kMeanReach;
   method.parts = [](const Samples& rows, const MethodSettings& settings) {
@@ -252,9 +252,8 @@ RowsMethod rows_of_mean(const MixedDenoisingOptions& options) {
     parts.guides = settings.guides;
     return parts;
   };
-  method.filters = [options](const Guides& guides, int first_row, double samples) {
-    const FilterKinds kinds = kinds_for(samples, options.use_oidn);
-    return filtered_candidates(guides, CandidateBase::kMean, kinds, first_row);
+  method.filters = [with_oidn](const Guides& guides, int first_row) {
+    return filtered_candidates(guides, CandidateBase::kMean, kinds_of_mean(with_oidn), first_row);
   };
   method.are_enough = [](const Samples& rows) { return can_be_mixed(rows.independent); };
   method.of_few = [](const Samples& rows, const MethodSettings&, const std::vector<CandidateMaker>& makers) {
@@ -272,7 +271,7 @@ RowsMethod rows_of_pair(const Method& base) {
     parts.guides = settings.guides;
     return parts;
   };
-  method.filters = [](const Guides& guides, int first_row, double) {
+  method.filters = [](const Guides& guides, int first_row) {
     return filtered_candidates(guides, CandidateBase::kPair, FilterKinds::kNlMeans, first_row);
   };
   method.are_enough = [n = 2 * base.fewest_groups](const Samples& rows) {
@@ -289,9 +288,7 @@ RowsMethod rows_of_pair(const Method& base) {
 void allow_rows(const Method& base, const MixedDenoisingOptions& options, bool with_oidn, Method& method) {
   method.reach = -1;
   if (base.reach < 0 || options.history.before || options.history.keep_samples) return;
-  MixedDenoisingOptions used = options;
-  used.use_oidn = with_oidn;
-  RowsMethod rows = base.is_mean() ? rows_of_mean(used) : rows_of_pair(base);
+  RowsMethod rows = base.is_mean() ? rows_of_mean(with_oidn) : rows_of_pair(base);
   rows.weighting = settings_of(options.mode).weighting;
   if (with_oidn) rows.network = options.oidn;
   method.reach = rows_reach(rows);

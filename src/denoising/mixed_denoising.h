@@ -88,6 +88,7 @@ struct MixedDenoising {
   std::vector<std::string> names;  ///< of the candidates
   std::vector<Image> candidates;   ///< made of all samples
   std::vector<Image> weights;      ///< one channel each
+  Planes shares = {};              ///< CandidateSet::shares
 };
 /// Implements with_denoising() for any candidates. `std_error`: estimate the result's error. `layers`: denoise these
 /// layers of a mean, too.

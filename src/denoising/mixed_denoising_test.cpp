@@ -137,23 +137,19 @@ TEST(MixedDenoising, TellsHowMuchNoiseIsBehindGlass) {
   EXPECT_EQ(sum_of(denoised_mean(in.independent, DenoiseMode::kAuto).risk_rows).specular_noise, 0);
 }
 
-TEST(MixedDenoising, OfManySamplesMixesNlMeansBesideTheRegression) {
+TEST(MixedDenoising, OfASinglePassWeighsTheCandidatesOfAllFilters) {
   const Inputs in(1);
   Image albedo(kWidth, kHeight, 3);
   std::fill(albedo.data.begin(), albedo.data.end(), 0.5f);
   MethodSettings settings;
   settings.guides.albedo = &albedo;
-  std::vector<uint32_t> counts(static_cast<size_t>(kWidth) * kHeight, 63);
-  GroupedImage image = in.independent.view();
-  image.counts = counts.data();
-  const auto has_sharp = [&] {
-    const std::map<std::string, Image> stages = mean_denoiser(DenoiseMode::kAuto).stages({{}, image}, settings);
-    EXPECT_TRUE(stages.contains("candidate-regression"));
-    return stages.contains("candidate-sharp");
-  };
-  EXPECT_FALSE(has_sharp());
-  std::fill(counts.begin(), counts.end(), 64);
-  EXPECT_TRUE(has_sharp());
+  const std::map<std::string, Image> stages =
+      mean_denoiser(DenoiseMode::kAuto).stages({{}, in.independent.view()}, settings);
+  for (const char* name : {"regression", "sharp", "smooth", "demodulated", "weighed"})
+    EXPECT_TRUE(stages.contains(std::string("candidate-") + name)) << name;
+  double weight = 0;
+  for (const float w : stages.at("weight-weighed").data) weight += w;
+  EXPECT_GT(weight, 0.01 * kWidth * kHeight);
 }
 
 TEST(MixedDenoising, OfASinglePassHasLessErrorThanItsMean) {

@@ -120,9 +120,10 @@ Image disagreement(const CandidateSet& set, const Image& guide, const Image& ima
   constexpr int kWindow = 5;
   constexpr double kLeast = 1.0 / 30;
   const int width = image.width, height = image.height;
-  const size_t m = set.candidates.size();
+  const size_t m = set.n_made();
   std::vector<Planes> means;
-  for (const Image& candidate : set.candidates) {
+  for (size_t p = 0; p < m; ++p) {
+    const Image& candidate = set.candidates[p];
     Planes of_pixels(width, height, 1, 0, 0);
     parallel_for(height, 8, [&](int y) {
       for (int x = 0; x < width; ++x) {

@@ -39,6 +39,9 @@ namespace covary {
 struct CandidateSet {
   Image base;                     ///< F
   std::vector<Image> candidates;  ///< C_p
+  /// If there are any, the last candidate consists of the others with these shares (weighing/weighing.h).
+  Planes shares = {};
+  size_t n_made() const { return candidates.size() - (shares.count() > 0 ? 1 : 0); }  ///< without that one
 };
 
 struct MixtureInput {

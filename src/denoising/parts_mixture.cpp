@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <deque>
 #include <iterator>
+#include <span>
+#include <string>
 
 #include "core/parallel.h"
+#include "denoising/weighed_candidate.h"
 #include "filters/residual_correction.h"
 #include "risk/relative_weight.h"
 
@@ -26,6 +29,9 @@ constexpr UsualWeight kUsual[] = {{"oidn", 0.85f, 0},
                                   {"regression", 0, 0.9f},
                                   {"sharp", 0.05f, 0.1f},
                                   {"demodulated", 0.05f, 0.1f}};
+/// Those beside a candidate that consists of the others.
+constexpr UsualWeight kUsualBesideWeighed[] = {
+    {"regression", 0, 0.45f}, {"demodulated", 0, 0.05f}, {kWeighedName, 0, 0.5f}};
 
 /// MixtureInput::usual_count up to kSamplesOfUsual samples per pixel; with more, it falls inversely to their number.
 constexpr float kCountOfUsual = 0.2f, kSamplesOfUsual = 16;
@@ -50,14 +56,14 @@ float count_of_usual(double samples) {
 
 /// The typical weights of the candidates, with a sum of 1; empty if none is known.
 std::vector<float> usual_weights(const std::vector<CandidateMaker>& makers) {
-  const bool network = has_network(makers);
+  const bool network = has_network(makers), is_weighed = !makers.empty() && makers.back().shares;
+  const std::span<const UsualWeight> known = is_weighed ? std::span<const UsualWeight>(kUsualBesideWeighed) : kUsual;
   std::vector<float> weights;
   float sum = 0;
   for (const CandidateMaker& maker : makers)
     for (const std::string& name : maker.names) {
-      const auto usual =
-          std::find_if(std::begin(kUsual), std::end(kUsual), [&](const UsualWeight& u) { return name == u.name; });
-      weights.push_back(usual == std::end(kUsual) ? 0 : network ? usual->with_network : usual->without);
+      const auto usual = std::find_if(known.begin(), known.end(), [&](const UsualWeight& u) { return name == u.name; });
+      weights.push_back(usual == known.end() ? 0 : network ? usual->with_network : usual->without);
       sum += weights.back();
     }
   if (sum == 0) return {};
@@ -129,12 +135,15 @@ std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>&
     sets.push_back({part->image.estimate, {}});
   }
   for (const CandidateMaker& maker : makers) {
+    if (!maker.make) continue;
     std::vector<std::vector<Image>> images = maker.make(inputs);
     for (size_t i = 0; i < sets.size(); ++i)
       std::move(images[i].begin(), images[i].end(), std::back_inserter(sets[i].candidates));
   }
   for (size_t i = 0; i < sets.size(); ++i)
     if (parts[i]->limited && has_network(makers)) limit_by_network(inputs[i], sets[i]);
+  for (const CandidateMaker& maker : makers)
+    for (size_t i = 0; maker.shares && i < sets.size(); ++i) add_weighed(maker, inputs[i], sets[i]);
   return sets;
 }
 

@@ -6,15 +6,19 @@
 #include <utility>
 
 #include "denoising/mixed_rows.h"
+#include "denoising/weighed_candidate.h"
 #include "estimators/result_rows.h"
 #include "filters/regression.h"
 #include "filters/residual_correction.h"
 #include "risk/halves.h"
+#include "weighing/weighing.h"
 
 namespace covary {
 namespace {
 
-static_assert(kRegressionCell % kResidualCell == 0, "bands begin with cells of all kinds");
+/// Bands begin with cells of all kinds.
+constexpr int kBandCell = 24;
+static_assert(kBandCell % kResidualCell == 0 && kBandCell % kRegressionCell == 0 && kBandCell % kWeighingRows == 0);
 
 /// Rows of the guides.
 struct GuideRows {
@@ -43,6 +47,12 @@ struct Band {
   GuideRows guides;
   MethodSettings settings;
 };
+
+/// Radius of influence of the image on a pixel of any candidate.
+int candidates_reach(const RowsMethod& method) {
+  return method.reach_of_parts + kCandidateReach +
+         (method.base == CandidateBase::kMean && !method.network ? kWeighingReach : 0);
+}
 
 class RowsDenoising {
  public:
@@ -75,11 +85,10 @@ class RowsDenoising {
   /// Calls f(band, y, n) for bands that hold rows y … y + n - 1 and `reach` more on both sides.
   template <typename Function>
   void for_each_band(int reach, int first, int end, const Function& f) const {
-    const int step = std::max(kRegressionCell,
-                              (image_.rows_at_once - 2 * reach) / kRegressionCell * kRegressionCell - kRegressionCell);
+    const int step = std::max(kBandCell, (image_.rows_at_once - 2 * reach) / kBandCell * kBandCell - kBandCell);
     for (int y = first; y < end; y += step) {
       const int n = std::min(step, end - y);
-      const int begin = std::max(0, y - reach) / kRegressionCell * kRegressionCell;
+      const int begin = std::max(0, y - reach) / kBandCell * kBandCell;
       const int rows = std::min(image_.height, y + n + reach) - begin;
       Band band{begin, y - begin, image_.rows(begin, rows), GuideRows(settings_.guides, begin, rows), settings_};
       band.settings.guides = band.guides.guides;
@@ -128,15 +137,19 @@ class RowsDenoising {
   }
 
   std::vector<CandidateMaker> makers_of(const Band& band) const {
-    std::vector<CandidateMaker> makers = {method_.filters(band.guides.guides, band.first, whole_.samples)};
-    if (!network_) return makers;
+    std::vector<CandidateMaker> makers = {method_.filters(band.guides.guides, band.first)};
+    const bool is_mean = method_.base == CandidateBase::kMean;
+    if (!network_) {
+      if (is_mean && enough_) add_weighing_maker(band.guides.guides, makers);
+      return makers;
+    }
     const auto rows = std::make_shared<NetworkImages>();
     rows->runs = network_->runs;
     for (size_t i = 0; i < rows->images.size(); ++i)
       if (!network_->images[i].data.empty())
         rows->images[i] = rows_of(network_->images[i], band.first, band.rows.independent.height);
     CandidateMaker network = neural_candidates({}, {}, method_.base, rows);
-    makers.insert(method_.base == CandidateBase::kMean ? makers.begin() : makers.end(), std::move(network));
+    makers.insert(is_mean ? makers.begin() : makers.end(), std::move(network));
     return makers;
   }
 
@@ -144,7 +157,7 @@ class RowsDenoising {
     std::vector<NormalRow> all;
     std::vector<CandidateMaker> makers;
     for (const auto& [first, end] : sampled_rows(image_.width, image_.height))
-      for_each_band(method_.reach_of_parts + kCandidateReach, first, end, [&](const Band& band, int, int n) {
+      for_each_band(candidates_reach(method_), first, end, [&](const Band& band, int, int n) {
         makers = makers_of(band);
         const std::vector<NormalRow> rows = normal_rows_of(method_.parts(band.rows, band.settings), makers,
                                                            method_.weighting, band.skipped, band.skipped + n);
@@ -186,7 +199,7 @@ class RowsDenoising {
 
 int rows_reach(const RowsMethod& method) {
   const bool is_mean = method.base == CandidateBase::kMean;
-  return method.reach_of_parts + kCandidateReach + mixture_reach(is_mean, method.weighting) + kErrorReach;
+  return candidates_reach(method) + mixture_reach(is_mean, method.weighting) + kErrorReach;
 }
 
 double bytes_of_whole(bool with_network) {

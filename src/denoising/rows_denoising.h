@@ -22,8 +22,7 @@ struct RowsMethod {
   CandidateBase base = CandidateBase::kMean;
   int reach_of_parts = 0;  ///< radius of influence of the images on the parts
   std::function<DenoisingParts(const Samples& rows, const MethodSettings& settings)> parts;
-  /// `samples`: mean_samples() of the image.
-  std::function<CandidateMaker(const Guides& guides, int first_row, double samples)> filters;
+  std::function<CandidateMaker(const Guides& guides, int first_row)> filters;
   std::optional<DenoiseOptions> network;
   /// The image of rows whose samples are too few for a mixture.
   std::function<MethodImage(const Samples& rows, const MethodSettings& settings,

@@ -94,16 +94,16 @@ Method denoiser(const char* name, DenoiseMode mode, bool with_network = false) {
 }
 
 TEST(RowsDenoising, OfAMeanHaveTheBitsOfTheWhole) {
-  const Scene scene(331, 4);
+  const Scene scene(451, 4);
   const Method estimator = denoiser("none", DenoiseMode::kAuto);
-  for (const int spare : {24, 60, 90}) {
+  for (const int spare : {48, 60, 90}) {
     check(estimator, scene, false, spare, "without guides");
     check(estimator, scene, true, spare, "with guides");
   }
 }
 
 TEST(RowsDenoising, OfAMeanOfUnequalSamplesHaveTheBitsOfTheWhole) {
-  Scene scene(301, 4);
+  Scene scene(421, 4);
   const auto set_counts = [&](uint32_t least) {
     scene.independent.counts.clear();
     for (int i = 0; i < kWidth * scene.height; ++i)
@@ -130,9 +130,9 @@ TEST(RowsDenoising, WithTheNetworkHaveTheBitsOfTheWhole) {
     EXPECT_NE(missing_network({"auto"}).find("pip install pyoidn"), std::string::npos);
     return;
   }
-  const Scene scene(331, 4);
+  const Scene scene(451, 4);
   const Method of_mean = denoiser("none", DenoiseMode::kAuto, true);
-  check(of_mean, scene, true, 24, "a mean with guides");
+  check(of_mean, scene, true, 48, "a mean with guides");
   check(of_mean, scene, false, 60, "a mean without guides");
   check(denoiser("iicv", DenoiseMode::kAuto, true), Scene(601, 6), true, 60, "a pair");
 }

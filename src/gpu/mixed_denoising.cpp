@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "denoising/mixed_rows.h"
+#include "denoising/weighed_candidate.h"
 #include "gpu/denoising_parts.h"
 #include "gpu/filtered_candidates.h"
 #include "gpu/held_out.h"
@@ -60,20 +61,39 @@ class MeanDenoising {
           neural_candidates({}, {}, CandidateBase::kMean, std::make_shared<const NetworkImages>(network)));
     }
     makers_.emplace_back().names = filter_names(request_.guides, CandidateBase::kMean, request_.kinds);
+    add_weighing_maker(request_.guides, makers_);
     n_candidates_ = static_cast<int>(names_of(makers_).size());
     for (size_t i = 0; i < parts_.size(); ++i) {
       candidates_[i] = device_.make<float>(3 * pixels() * n_candidates_);
       const size_t filtered = request_.network ? 3 * pixels() * kNetworkCandidates : 0;
       filter(device_, groups_, *guides_, parts_[i], i > 0, {&candidates_[i], filtered});
-      if (!request_.network) continue;
-      const GroupSet set = i == 0 ? GroupSet{} : GroupSet{static_cast<int>(i) - 1, 2};
-      write_network_candidates(device_, groups_, parts_[i], relative_counts_of(device_, request_.independent, set),
-                               network.images[i], candidates_[i]);
-      if (parts_[i].limited)
-        limit_by_network(device_, groups_.width, groups_.height, n_candidates_, parts_[i].limited,
-                         parts_[i].limited_error, candidates_[i]);
+      if (request_.network) add_network(network.images[i], i);
+      if (makers_.back().shares) add_weighed_candidate(i);
     }
     network_runs_ = network.runs;
+  }
+
+  void add_network(const Image& clean, size_t i) {
+    const GroupSet set = i == 0 ? GroupSet{} : GroupSet{static_cast<int>(i) - 1, 2};
+    write_network_candidates(device_, groups_, parts_[i], relative_counts_of(device_, request_.independent, set), clean,
+                             candidates_[i]);
+    if (parts_[i].limited)
+      limit_by_network(device_, groups_.width, groups_.height, n_made(), parts_[i].limited, parts_[i].limited_error,
+                       candidates_[i]);
+  }
+
+  /// Number of candidates without that which consists of others.
+  int n_made() const { return n_candidates_ - (makers_.back().shares ? 1 : 0); }
+
+  /// The others come down, and that candidate goes up.
+  void add_weighed_candidate(size_t i) {
+    CandidateSet set{downloaded(parts_[i].independent.mean, 3), {}};
+    for (int p = 0; p < n_made(); ++p) set.candidates.push_back(downloaded(candidates_[i], 3, 3 * pixels() * p));
+    const Image std_error = downloaded(parts_[i].noisy_error(), 3);
+    CandidateInput input;
+    input.std_error = &std_error;
+    add_weighed(makers_.back(), input, set);
+    device_.write(candidates_[i], set.candidates.back().data, 3 * pixels() * n_made());
   }
 
   MixtureBuffers mixture_input() {
@@ -111,7 +131,9 @@ class MeanDenoising {
                             &candidates_[0], &groups_.valid};
     for (const int half : {0, 1}) held_out.independent[half] = &parts_[half + 1].independent;
     rows.error = held_out_parts(device_, held_out);
-    rows.disagreement = downloaded(disagreement(device_, input, mixed.image), 1);
+    MixtureBuffers made = input;
+    made.candidates = n_made();
+    rows.disagreement = downloaded(disagreement(device_, made, mixed.image), 1);
     rows.result.bias = held_out_bias(device_, held_out, {&candidates_[1], &candidates_[2]});
     rows.result.risk_rows =
         image_risk(device_, held_out, mixed.image, parts_[0].independent, groups_, guides_->surfaces());
