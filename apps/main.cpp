@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // The `covary` program. Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but target error missed (--until), and
-// after a signal 128 + its number: 130 for Ctrl-C.
+// after a signal 128 + its number: 130 for Ctrl-C. Where COVARY_EXIT_CODES is set, those of sysexits.h say what failed:
+// 65 for the content of a file, 74 for a file that cannot be read or written, 70 for a bug. Where COVARY_PROGRESS names
+// a file, the line of progress is added to it (progress.cpp).
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <sysexits.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <iostream>
@@ -34,6 +38,13 @@ namespace covary {
 namespace {
 
 std::string g_command_line;
+bool g_tells_kinds = false;  // of errors, by exit codes
+
+/// What the caller asked for is not for the programs that this one runs.
+void read_environment() {
+  g_tells_kinds = std::getenv("COVARY_EXIT_CODES") != nullptr;
+  unsetenv("COVARY_EXIT_CODES");
+}
 
 /// Opens closed standard streams: otherwise the next file would get their descriptors, and messages would be written
 /// into it. Standard output then fails, as it should; error messages are lost.
@@ -52,7 +63,9 @@ int report(const char* program, const Error& error) {
   std::fprintf(stderr, "%s: %s%s\n", program, error.code() == ErrorCode::kInternal ? "internal error: " : "",
                printable(as_options(error.what())).c_str());
   if (const auto* unfinished = dynamic_cast<const Unfinished*>(&error)) return unfinished->exit_code();
-  return error.code() == ErrorCode::kUsage ? 2 : 1;
+  if (error.code() == ErrorCode::kUsage) return 2;
+  if (!g_tells_kinds) return 1;
+  return error.code() == ErrorCode::kInput ? EX_DATAERR : error.code() == ErrorCode::kIo ? EX_IOERR : EX_SOFTWARE;
 }
 
 /// Long options of `command` that `given` may mean, misspelt or abbreviated. Compared without dashes, which would make
@@ -182,6 +195,7 @@ void add_commands(CLI::App& app) {
 
 int main(int argc, char** argv) {
   covary::open_closed_streams();
+  covary::read_environment();
   std::vector<std::string> words(argv, argv + argc);
   if (words.empty()) words.emplace_back();
   words[0] = "covary";

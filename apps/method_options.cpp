@@ -57,8 +57,8 @@ void set_parameter(const std::vector<MethodOptions>& methods, const std::string&
       (*method.values)[name] = *good;
       return;
     }
-  throw CLI::ValidationError("--set", fmt::format("no method has a parameter '{}'{}: expected {}", name,
-                                                  did_you_mean(name, names), fmt::join(names, ", ")));
+  throw CLI::ValidationError("--set", fmt::format("no method has a parameter '{}'; expected {}{}", name,
+                                                  fmt::join(names, ", "), did_you_mean(name, names)));
 }
 
 /// What is accepted as the parameter's value, as in the help of options.

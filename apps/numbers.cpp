@@ -42,7 +42,7 @@ CLI::Validator finite_number() {
 CLI::Validator one_of(const std::vector<std::string>& names) {
   const auto check = [names](const std::string& text) -> std::string {
     if (std::find(names.begin(), names.end(), text) != names.end()) return "";
-    return fmt::format("'{}'{}: expected {}", text, did_you_mean(text, names), fmt::join(names, ", "));
+    return fmt::format("'{}': expected {}{}", text, fmt::join(names, ", "), did_you_mean(text, names));
   };
   return {check, fmt::format("{{{}}}", fmt::join(names, ",")), "name"};
 }

@@ -9,15 +9,29 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <utility>
 
 namespace covary {
 namespace {
 
-constexpr double kTerminalSeconds = 0.2;               // between two drawings
+constexpr double kTerminalSeconds = 0.2;               // between two drawings, and lines for another program
 constexpr double kLogSeconds = 10, kLogGrowth = 1.35;  // until the first line of a log, and from one to the next
 constexpr double kUnknown = 1e9;                       // seconds, until a time limit says more
 constexpr int kUsualColumns = 80, kBarColumns = 30;
+
+/// The file in which a program that runs this one wants the line, as often as on a terminal; null: none.
+const char* file_of_caller() {
+  static const char* const name = std::getenv("COVARY_PROGRESS");
+  return name;
+}
+
+void write_to_caller(const std::string& line) {
+  std::FILE* file = std::fopen(file_of_caller(), "ae");
+  if (!file) return;  // nobody reads it any more
+  std::fprintf(file, "%s\n", line.c_str());
+  std::fclose(file);
+}
 
 int terminal_columns() {
   winsize size{};
@@ -48,7 +62,10 @@ std::string format_count(double count) {
 }
 
 ProgressLine::ProgressLine(std::string label, bool quiet)
-    : label_(std::move(label)), quiet_(quiet), terminal_(isatty(2) == 1), next_(terminal_ ? 0 : kLogSeconds) {}
+    : label_(std::move(label)),
+      quiet_(quiet),
+      terminal_(isatty(2) == 1),
+      next_(terminal_ || file_of_caller() ? 0 : kLogSeconds) {}
 
 ProgressLine::~ProgressLine() { finish(); }
 
@@ -163,12 +180,13 @@ std::string ProgressLine::text(int columns) const {
 void ProgressLine::draw() {
   if (quiet_ || finished_) return;
   const double now = of_line_.seconds();
-  next_ = terminal_ ? now + kTerminalSeconds : std::max(now + kLogSeconds, now * kLogGrowth);
+  next_ = terminal_ || file_of_caller() ? now + kTerminalSeconds : std::max(now + kLogSeconds, now * kLogGrowth);
   const int columns = terminal_ ? terminal_columns() - 1 : 1000;  // the last column would wrap the line
   const std::string line = cut_to(text(terminal_ ? columns : kUsualColumns + kBarColumns), columns);
+  drawn_ = true;
+  if (file_of_caller()) return write_to_caller(line);
   std::fprintf(stderr, terminal_ ? "\r%s\033[K" : "%s\n", line.c_str());
   std::fflush(stderr);
-  drawn_ = true;
 }
 
 void ProgressLine::redraw_regularly() {

@@ -43,12 +43,12 @@ def read_groups(paths: str | PathLike[str] | Iterable[str | PathLike[str]], laye
     return groups
 
 
-@checked(image=array, albedo=array, normal=array, library=empty_or(path))
-def denoise(image: Any, albedo: Any = None, normal: Any = None, *, library: str | PathLike[str] = "") -> FloatArray:
+@checked(image=array, albedo=array, normal=array, oidn=empty_or(path))
+def denoise(image: Any, albedo: Any = None, normal: Any = None, *, oidn: str | PathLike[str] = "") -> FloatArray:
     """Denoises the image [H, W, 3] with Open Image Denoise, if installed (`pip install pyoidn`). Biased.
 
     albedo, normal: guides [H, W, 3], the normal only together with the albedo.
-    library: its file or folder, as `covary denoise --oidn` takes it.
+    oidn: its file or folder, as `covary denoise --oidn` takes it.
     """
-    denoised: FloatArray = _covary.denoise(image, albedo, normal, fspath(library))
+    denoised: FloatArray = _covary.denoise(image, albedo, normal, fspath(oidn))
     return denoised

@@ -233,6 +233,7 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
                      **{name: keywords.get(name) for name in ("exposure", "aov_samples", "aovs")}})
     declared = {name.replace("_", "-"): keywords.pop(name) for name in _DECLARED if name in keywords}
     texts = text_options(keywords, estimator or DEFAULT)
+    _covary.check_output("" if output is None else fspath(output))
     shown = _phases(progress)
     with ended(shown):
         chosen = _loaded(scene, integrator, shown)

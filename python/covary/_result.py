@@ -58,6 +58,9 @@ class Result:
     aovs: further images by name, [H, W, 3]: layers, which add up to the image, and auxiliary images if they were asked
         for or guided a denoiser: "Albedo", "N", "P", and "DenoisingAlbedo" and "DenoisingNormal", which are seen in
         mirrors and through glass.
+    bias_share: for denoised images: the fraction of predicted_relmse that is squared bias; None for others.
+    risks: for denoised images: the relMSE that the mean of the samples and each denoised image alone would have had, by
+        name.
     """
 
     image: FloatArray = field(repr=False)
@@ -71,6 +74,8 @@ class Result:
     estimator: str
     samples_per_pixel: float | None
     aovs: dict[str, FloatArray] = field(repr=False)
+    bias_share: float | None
+    risks: dict[str, float]
 
     @checked(path=path)
     def save(self, path: str | PathLike[str]) -> None:
@@ -173,9 +178,6 @@ class RenderResult(Result):
     until_reached: whether the predicted error is at most the target; None without a target.
     time_choice: after a time limit: what the clock decided, as options of the program, which make the same image again;
         None without one, or if pixels may differ in their numbers of samples.
-    bias_share: for denoised images: the fraction of predicted_relmse that is squared bias; None for others.
-    risks: for denoised images: the relMSE that the mean of the samples and each denoised image alone would have had, by
-        name.
     network: name and version of the neural network that was used; "" without one.
     predicted_relmse_p95: the predicted error that 95 % of the blocks of 16 x 16 pixels do not exceed; None if
         predicted_relmse is.
@@ -190,8 +192,6 @@ class RenderResult(Result):
     complete: bool
     until_reached: bool | None
     time_choice: str | None
-    bias_share: float | None
-    risks: dict[str, float]
     network: str
     predicted_relmse_p95: float | None
     not_finite_samples: int

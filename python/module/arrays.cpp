@@ -47,10 +47,11 @@ void check_shape(const Floats& floats, const std::string& name, const std::strin
   for (size_t i = 0; fits && i < wanted.size(); ++i)
     fits = wanted[i] < 0 ? floats.shape[i] > 0 && floats.shape[i] <= std::numeric_limits<int>::max()
                          : floats.shape[i] == wanted[i];
-  if (!fits)
-    throw nb::value_error(
-        fmt::format("{}: found the shape {}; expected [{}], none of them 0", name, text_of(floats.shape), shape)
-            .c_str());
+  if (fits) return;
+  const bool has_none = std::ranges::find(floats.shape, 0) != floats.shape.end();
+  throw nb::value_error(fmt::format("{}: found the shape {}{}; expected [{}]", name, text_of(floats.shape),
+                                    has_none ? ", without values" : "", shape)
+                            .c_str());
 }
 
 /// A NumPy array of the vector's memory, which is freed with the array.
@@ -153,6 +154,17 @@ void add_prediction(const std::optional<PredictedError>& predicted, nb::dict& to
   to["predicted_relmse"] = relmse;
   to["predicted_bounds"] = bounds;
   to["prediction_doubt"] = nb::str(doubt.c_str());
+}
+
+void add_risks(const EstimatorResult& image, nb::dict& to) {
+  nb::dict risks;
+  nb::object bias_share = nb::none();
+  if (image.risks) {
+    bias_share = nb::float_(image.risks->bias_share);
+    for (const auto& [name, relmse] : image.risks->images) risks[name.c_str()] = nb::float_(relmse);
+  }
+  to["bias_share"] = bias_share;
+  to["risks"] = risks;
 }
 
 nb::object groups_array(std::vector<float>&& values, int width, int height, int groups) {

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "estimators/estimator_result.h"
 #include "film/film.h"
 #include "film/grouped_image.h"
 #include "risk/predicted_error.h"
@@ -60,6 +61,8 @@ Image image_of(nb::handle array, const std::string& name, const std::string& sha
 nb::object array_of(Image&& image);
 /// Adds "predicted_relmse" and "predicted_bounds" (low, high), both None if not known, and "prediction_doubt".
 void add_prediction(const std::optional<PredictedError>& predicted, nb::dict& to);
+/// Adds "bias_share" and "risks" of a denoised image, None and an empty dict if it is none.
+void add_risks(const EstimatorResult& image, nb::dict& to);
 /// [T, H, W, 3] of values in the order [H, W, T, 3].
 nb::object groups_array(std::vector<float>&& values, int width, int height, int groups);
 

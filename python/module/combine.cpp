@@ -276,6 +276,7 @@ nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, c
   d["warnings"] = warnings;
   d["nonfinite_pixels"] = combined.image.nonfinite_pixels;
   d["estimator"] = estimator.text;
+  add_risks(combined.image, d);
   d["samples_per_pixel"] = samples;
   return d;
 }
@@ -294,7 +295,6 @@ nb::object correlation(const Correlation& c) {
 }
 
 nb::dict check(nb::object crn, nb::object independent) {
-  if (crn.is_none()) throw nb::type_error("crn: found None; expected a covary.Film or an array");
   Pair pair(crn, independent, nullptr);
   InputFindings inputs;
   run_work(

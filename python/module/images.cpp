@@ -30,8 +30,8 @@ void write(const std::string& path, nb::object array, const std::map<std::string
   const std::vector<std::string>& known = image_extensions();
   if (const std::string extension = lower_extension(path);
       std::find(known.begin(), known.end(), extension) == known.end())
-    throw Error(ErrorCode::kUsage, fmt::format("path: found '{}', which ends in '{}'; expected one of {}", path,
-                                               extension, fmt::join(known, ", ")));
+    throw Error(ErrorCode::kUsage,
+                fmt::format("path: found '{}'; the name must end in {}", path, fmt::join(known, ", ")));
   const Image image = image_of(array, "image");
   const ImagePlace place{image.width, image.height, {0, 0, image.width, image.height}};
   run_work([&](WorkState&) { write_image(path, image, place, attributes); }, nb::none());

@@ -15,6 +15,7 @@
 #include "plans/integrator_choice.h"
 #include "plans/made_of.h"
 #include "plans/render_settings.h"
+#include "plans/result_files.h"
 #include "python/module/arrays.h"
 #include "python/module/bindings.h"
 #include "python/module/live.h"
@@ -122,14 +123,7 @@ nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std:
   d["complete"] = result.complete;
   d["until_reached"] = result.until_reached;
   d["time_choice"] = result.of_time ? nb::cast(result.of_time->text()) : nb::none();
-  nb::dict risks;
-  std::optional<double> bias_share;
-  if (result.image.risks) {
-    bias_share = result.image.risks->bias_share;
-    for (const auto& [name, relmse] : result.image.risks->images) risks[name.c_str()] = relmse;
-  }
-  d["bias_share"] = bias_share;
-  d["risks"] = risks;
+  add_risks(result.image, d);
   return d;
 }
 
@@ -272,6 +266,7 @@ void bind_render(nb::module_& module) {
               "of_estimator: dict[str, str], films_only: bool, threads: int, progress: typing.Any, page: Page | None, "
               "step: typing.Any) "
               "-> dict[str, typing.Any]"));
+  module.def("check_output", &check_output, "path"_a, nb::sig("def check_output(path: str) -> None"));
   module.def("image_of_films", &image_of_films, "values"_a, "of_estimator"_a, "films"_a, "aovs"_a,
              nb::sig("def image_of_films(values: dict[str, str], of_estimator: dict[str, str], films: dict[str, Film], "
                      "aovs: dict[str, typing.Any]) -> dict[str, typing.Any]"));

@@ -37,8 +37,8 @@ const MethodPlugin& plugin_named(const std::string& name) {
   for (const MethodPlugin& plugin : estimator_plugins())
     if (name == plugin.name) return plugin;
   const std::vector<std::string> names = estimator_names();
-  throw Error(ErrorCode::kUsage, fmt::format("no estimator is named '{}'{}; expected {}", name,
-                                             did_you_mean(name, names), fmt::join(names, ", ")));
+  throw Error(ErrorCode::kUsage, fmt::format("no estimator is named '{}'; expected {}{}", name, fmt::join(names, ", "),
+                                             did_you_mean(name, names)));
 }
 
 }  // namespace

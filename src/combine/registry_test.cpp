@@ -249,14 +249,14 @@ TEST(EstimatorRegistry, SaysWhatIsWrong) {
     return message_of([&] { make_estimator(name, values); });
   };
   EXPECT_EQ(message("iidw", {}),
-            fmt::format("no estimator is named 'iidw'; did you mean 'iduw' or 'iicv'?; expected {}",
+            fmt::format("no estimator is named 'iidw'; expected {}; did you mean 'iduw' or 'iicv'?",
                         fmt::join(estimator_names(), ", ")));
   EXPECT_EQ(message("iduw", {{"k", "3"}}), "`k` is an option of `estimator` iicv, cv-baseline, not of iduw");
   EXPECT_EQ(message("iicv", {{"windwo", "3"}}), "`windwo` is not an option of any estimator; did you mean 'window'?");
   EXPECT_EQ(message("iicv", {{"k", "3x"}}), "`k` '3x': expected a whole number of at least 1");
   EXPECT_EQ(message("cv-baseline", {{"ridge", "nan"}}), "`ridge` 'nan': expected a number of at least 0");
   EXPECT_EQ(message("iicv", {{"penalty", "sampl"}}),
-            "`penalty` 'sampl'; did you mean 'sample'?: expected pilot, sample, asymmetric");
+            "`penalty` 'sampl': expected pilot, sample, asymmetric; did you mean 'sample'?");
   EXPECT_TRUE(contains(message("iicv", {{"k", "500"}}), "k is 500, expected 1 to 121"));
 }
 

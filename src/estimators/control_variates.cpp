@@ -355,6 +355,9 @@ void apply_control_variates(const ControlVariateInput& input, const ControlVaria
 }
 
 void check_k(int k, int window, std::vector<std::string>& problems) {
+  if (!kWindowRange.contains(window))
+    problems.push_back(
+        fmt::format("window is {}, expected an odd number from {} to {}", window, kWindowRange.low, kWindowRange.high));
   if (k < 1 || k > window * window)
     problems.push_back(fmt::format("k is {}, expected 1 to {}, the number of pixels in a window of {} x {}", k,
                                    window * window, window, window));

@@ -146,10 +146,10 @@ class Iduw {
 }  // namespace
 
 void check_iduw(const GroupedImage& crn, const GroupedImage& independent, const IduwOptions& options) {
-  COVARY_CHECK(kWindowRange.contains(options.window) && !options.gammas.empty() &&
-                   std::ranges::all_of(options.gammas, [](float gamma) { return gamma > 0; }),
+  COVARY_CHECK(!options.gammas.empty() && std::ranges::all_of(options.gammas, [](float gamma) { return gamma > 0; }),
                "options of iduw are in the ranges that iduw.h states");
   std::vector<std::string> problems;
+  check_k(1, options.window, problems);
   if (options.samples < 1)
     problems.push_back(fmt::format("samples is {}, expected the samples per pixel of the CRN image", options.samples));
   check_inputs(crn, independent, 4, 4, problems);

@@ -2,6 +2,7 @@
 // IICV against the double-precision reference; identities; degenerate inputs; determinism.
 #include "estimators/iicv.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -441,6 +442,16 @@ TEST(Iicv, ReportsEveryProblemAtOnce) {
             "the CRN image is 8 x 6 and the independent image 8 x 5; "
             "they must have the same size; the CRN image has 2 groups, at least 3 are needed (12 are recommended); the "
             "independent image has 1 group, at least 2 are needed with these settings");
+}
+
+TEST(Iicv, RefusesWindowsWithoutACentre) {
+  const test::Grouped image = test::constant_image(8, 6, 4, 1);
+  IicvOptions options;
+  for (const int window : {10, 1, 65}) {
+    options.window = window, options.k = 1;
+    EXPECT_EQ(message_of([&] { iicv(image.view(), image.view(), options); }, ErrorCode::kUsage),
+              fmt::format("iicv: window is {}, expected an odd number from 3 to 63", window));
+  }
 }
 
 }  // namespace

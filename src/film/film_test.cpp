@@ -300,6 +300,10 @@ TEST(Film, MergeRejectsWhatDoesNotBelongTogether) {
   EXPECT_TRUE(contains(message(b), "settings differs"));
   b = test_film(2, 2, 3), b.attributes[film_key::kSeed] = "two";
   EXPECT_TRUE(contains(message(b), "b.exr: attribute seed is 'two'"));
+  b.attributes.erase(std::string(film_key::kSeed));
+  EXPECT_TRUE(contains(message(b),
+                       "b.exr: it has no seed, by which films with the same samples are told from others; "
+                       "give each its own, in Python by film_from_groups(…, seed=1)"));
   b = test_film(3, 2, 3);
   EXPECT_TRUE(contains(message(b), "number of groups differs: '2' in a.exr, '3' in b.exr"));
   b = test_film(2, 2, 3), b.aovs["N"] = Image(17, 19, 3);

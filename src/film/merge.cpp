@@ -28,6 +28,10 @@ std::string attribute(const Attributes& attributes, const std::string& key) {
 /// The seeds of a film, "1,2,7" -> {1, 2, 7}.
 std::set<uint64_t> seeds_of(const Attributes& attributes, const std::string& name) {
   const std::string text = attribute(attributes, film_key::kSeed);
+  if (text.empty())
+    throw Error(ErrorCode::kInput, name +
+                                       ": it has no seed, by which films with the same samples are told from others; "
+                                       "give each its own, in Python by film_from_groups(…, seed=1)");
   const auto fail = [&] {
     throw Error(ErrorCode::kInput, fmt::format("{}: attribute seed is '{}'; expected whole numbers below 2^64, "
                                                "separated by commas",

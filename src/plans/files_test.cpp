@@ -8,9 +8,11 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <tuple>
 
 #include "film/film_file.h"
 #include "film/image_file.h"
+#include "film/output_file.h"
 #include "integrators/aov.h"
 #include "plans/estimator_plans.h"
 #include "plans/folder_lock.h"
@@ -215,6 +217,27 @@ TEST(Failure, FilmsOfAnImageThatCannotBeWrittenAreKept) {
   warnings_of_failure("no such folder", scene, plan, request);
   EXPECT_EQ(read_film(folder.file("films/crn.exr")).mean_count(), 12);
   EXPECT_FALSE(fs::exists(folder.file("films/.lock")));
+}
+
+TEST(Failure, OutputsThatCannotBeWrittenAreToldBeforeAnyWork) {
+  const LoadedScene scene = load_sized(kRoom);
+  const TemporaryFolder folder;
+  write_text_file(folder.file("file"), "text");
+  const std::vector<std::tuple<std::string, ErrorCode, std::string>> cases{
+      {"missing/a.exr", ErrorCode::kIo, "no such folder " + folder.file("missing")},
+      {"file/a.exr", ErrorCode::kIo, "no such folder " + folder.file("file")},
+      {"a.png", ErrorCode::kUsage,
+       "`output` '" + folder.file("a.png") + "': the name must end in .exr; 'covary convert"},
+      {"a", ErrorCode::kUsage, "the name must end in .exr"}};
+  for (const auto& [name, code, message] : cases) {
+    RenderRequest request = request_of(24);
+    request.output = folder.file(name);
+    request.checkpoint_seconds = 300;
+    RenderCallbacks callbacks;
+    callbacks.stage = [](RenderStage) { ADD_FAILURE() << "begins"; };
+    EXPECT_TRUE(contains(message_of([&] { render(scene, average_plan(), request, callbacks); }, code), message));
+  }
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1);
 }
 
 TEST(FolderLock, NamesTheProcessThatHoldsTheFolder) {

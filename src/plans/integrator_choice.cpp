@@ -83,8 +83,7 @@ const Integrator& integrator_of(const LoadedScene& scene, const RenderRequest& r
 std::string unknown_integrator(const std::string& name) {
   if (name == "stokes") return "integrator 'stokes' is about the polarisation of light, which is not rendered here";
   const std::vector<std::string> names = integrator_names();
-  return fmt::format("unknown integrator '{}'{}; supported: {}", name, did_you_mean(name, names),
-                     fmt::join(names, ", "));
+  return fmt::format("unknown integrator '{}'; expected {}{}", name, fmt::join(names, ", "), did_you_mean(name, names));
 }
 
 }  // namespace covary

@@ -14,6 +14,7 @@
 #include "plans/integrator_trial.h"
 #include "plans/light_plan.h"
 #include "plans/plan_run.h"
+#include "plans/result_files.h"
 
 namespace covary {
 namespace {
@@ -32,6 +33,7 @@ void check_light_groups(const LoadedScene& scene) {
 
 void check(const LoadedScene& scene, const Plan& plan, const RenderRequest& request) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
+  check_output(request.output);
   if (request.spp && (*request.spp < 1 || *request.spp > kMaxBudget))
     usage(fmt::format("{} samples per pixel; expected 1 to {}", *request.spp, kMaxBudget));
   if (plan.method->pixel_pass() && (request.seconds > 0 || request.until > 0))

@@ -10,6 +10,7 @@
 #include "film/exposure.h"
 #include "film/film_file.h"
 #include "film/image_writer.h"
+#include "film/outputs.h"
 #include "integrators/aov.h"
 #include "plans/light_plan.h"
 #include "plans/made_of.h"
@@ -20,6 +21,10 @@ namespace covary {
 
 std::string preview_path(const std::string& output) {
   return std::filesystem::path(output).replace_extension(".png").string();
+}
+
+void check_output(const std::string& path) {
+  if (!path.empty()) Outputs().writes("`output`", path, OutputKind::kFilm);
 }
 
 void write_result_files(const Plan& plan, const RenderRequest& request, RenderResult& result) {

@@ -90,7 +90,7 @@ std::string problem_of(const Option& option, const std::string& text) {
   const bool is_too_large = option.type == Option::Type::kWhole && !std::isfinite(option.range.high) &&
                             parse_real(text).value_or(0) >= static_cast<double>(option.most);
   const std::string most = is_too_large ? fmt::format(", at most {}", option.most) : "";
-  return fmt::format("'{}'{}: expected {}{}", text, hint, option.expected(), most);
+  return fmt::format("'{}': expected {}{}{}", text, option.expected(), most, hint);
 }
 
 const Option* find_option(const std::vector<Option>& options, std::string_view name) {

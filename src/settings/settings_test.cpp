@@ -129,7 +129,7 @@ TEST(Settings, WhatIsNoValueIsRefused) {
   EXPECT_EQ(problem({{"fog-grid", "-1"}}), "`fog-grid` '-1': expected auto or a whole number from 1 to 9");
   EXPECT_EQ(problem({{"fog-density", "nan"}}), "`fog-density` 'nan': expected a number above 0 to 1");
   EXPECT_EQ(problem({{"fog-height", "1x"}}), "`fog-height` '1x': expected a number");
-  EXPECT_EQ(problem({{"fog-colour", "blu"}}), "`fog-colour` 'blu'; did you mean 'blue'?: expected red, blue");
+  EXPECT_EQ(problem({{"fog-colour", "blu"}}), "`fog-colour` 'blu': expected red, blue; did you mean 'blue'?");
   for (const char* size : {"7x8", "7", "7x", "-1x-1", "7x7x7", "x", ""})
     EXPECT_EQ(problem({{"fog-size", size}}), fmt::format("`fog-size` '{}': expected SIDExSIDE", size));
   EXPECT_EQ(problem({{"fog-jitter", "yes"}}), "`fog-jitter` 'yes': expected on, off");

@@ -84,8 +84,9 @@ class OneScreen(HelpTest):
         self.assertIn("\n  nee=on|off", of_guided)
         self.assertNotIn("cv-grid", of_guided)
         self.assertLessEqual(max(map(len, (of_iicv + of_guided).splitlines())), 100)
-        self.bad(2, "no method has a parameter 'windwo'; did you mean 'window'?: expected ", "render", "x.xml", "-o",
-                 "x.exr", "--set", "windwo=3")
+        self.bad(2, "no method has a parameter 'windwo'; expected ", "render", "x.xml", "-o", "x.exr", "--set",
+                 "windwo=3")
+        self.bad(2, "; did you mean 'window'?", "render", "x.xml", "-o", "x.exr", "--set", "windwo=3")
         self.bad(2, "--set: 'window': expected NAME=VALUE, e.g. k=50", "render", "x.xml", "-o", "x.exr", "--set",
                  "window")
         for former, now in (("--k", "--set k=VALUE"), ("--live-port", "--live=PORT"), ("--pt", "--independent"),

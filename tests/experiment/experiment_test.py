@@ -480,7 +480,7 @@ class Programs(ExperimentTest):
 
 class Mistakes(ExperimentTest):
     def test_methods_that_render_refuses(self):
-        refused = ((["--estimator", "iidw"], "'iidw'; did you mean 'iduw' or 'iicv'?: expected mixture, iicv"),
+        refused = ((["--estimator", "iidw"], "; did you mean 'iduw' or 'iicv'?"),
                    (["--windwo", "3"], "--windwo"),
                    (["--estimator", "iduw", "--set", "k=3"], "--set k is an option of --estimator iicv, cv-baseline"),
                    (["--set", "k=-3"], "--set k: '-3': expected a whole number of at least 1"))

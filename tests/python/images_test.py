@@ -148,7 +148,7 @@ class Images(PackageTest):
                                                         noisy(6, False)[0]))
 
     def test_denoiser_that_is_missing(self):
-        message = self.message_of(covary.UsageError, covary.denoise, noisy(6, False)[0], library="/nowhere")
+        message = self.message_of(covary.UsageError, covary.denoise, noisy(6, False)[0], oidn="/nowhere")
         self.assertIn("/nowhere", message)
         self.assertIn("only together with the albedo",
                       self.message_of(covary.UsageError, covary.denoise, noisy(6, False)[0],

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """experiment() with methods that are Python functions."""
+import contextlib
 import inspect
+import io
 import sys
 import threading
 import unittest
@@ -91,6 +93,29 @@ class Experiments(PackageTest):
                 self.experiment(locked=locked)
         self.assertEqual(seen, [1, 2, 1, 2])
         self.assertEqual(warned.filename, __file__)
+
+    def test_progress(self):
+        """A function gets finished and all runs; nothing is said unasked where nobody watches."""
+        told, said = [], io.StringIO()
+        with contextlib.redirect_stderr(said):
+            covary.experiment(SUITE, self.path / "out", scenes=ROOM.parent, progress=lambda *runs: told.append(runs))
+            covary.experiment(SUITE, self.path / "out", scenes=ROOM.parent)
+        self.assertEqual(said.getvalue(), "")
+        self.assertEqual({total for _, total in told} - {0}, {4}, told)  # two references and two seeds
+        self.assertEqual(sorted(told), told)
+
+    def test_line_on_a_terminal(self):
+        """From the beginning, and not asked for."""
+        class Terminal(io.StringIO):
+            def isatty(self):
+                return True
+
+        for progress, seen in ((None, True), (False, False), (True, True)):
+            said = Terminal()
+            with contextlib.redirect_stderr(said):
+                covary.experiment(SUITE, self.path / f"out-{progress}", scenes=ROOM.parent, progress=progress)
+            self.assertEqual("\r[0/" in said.getvalue(), seen, said.getvalue())
+            self.assertTrue(said.getvalue().endswith("\r" if seen else ""))
 
     def test_renderers(self):
         """covary renders nothing for them; they are told what of the scene to make."""

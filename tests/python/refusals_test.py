@@ -17,6 +17,17 @@ class Terminal(io.StringIO):
 
 
 class Refusals(PackageTest):
+    def test_outputs_are_checked_first(self):
+        """Before the scene is read, in the program's words; nothing is written."""
+        (self.path / "file").touch()
+        for name, error, message in (("missing/a.exr", covary.IoError, f"no such folder {self.path / 'missing'}"),
+                                     ("file/a.exr", covary.IoError, f"no such folder {self.path / 'file'}"),
+                                     ("a.png", covary.UsageError, "output 'a.png': the name must end in .exr"),
+                                     ("a", covary.UsageError, "the name must end in .exr")):
+            said = self.message_of(error, covary.render, "no_such_scene.xml", 4, output=self.path / name)
+            self.assertIn(message, said.replace(f"{self.path}/a", "a"))
+        self.assertEqual([file.name for file in self.path.iterdir()], ["file"])
+
     def test_misspelt_arguments(self):
         """Whatever their value is."""
         guide = numpy.ones(INDEPENDENT.shape[1:], numpy.float32)
@@ -30,7 +41,7 @@ class Refusals(PackageTest):
 
     def test_without_effect(self):
         of_none = {"estimator": "none"}
-        for arguments, message in (({"exposure": 1}, "exposure: found 1.0 without preview=True, where it has no effect"),
+        for arguments, message in (({"exposure": 1}, "exposure: found 1.0 without preview=True, where it has no"),
                                    ({**of_none, "aov_samples": 4}, "aov_samples: found 4 with estimator='none', where "
                                                                    "it has no effect without aovs=True"),
                                    ({**of_none, "device": "auto"}, "device: found 'auto' with estimator='none'")):
@@ -44,6 +55,26 @@ class Refusals(PackageTest):
         film = covary.combine(None, covary.film_from_groups(INDEPENDENT, 48), oidn="off")
         self.assert_same_bits(told.image, film.image)
         self.assertEqual(told.samples_per_pixel, 48)
+        self.assertEqual(told.risks, film.risks)
+        self.assertIn("mean", told.risks)
+        self.assertTrue(0 <= told.bias_share <= 1)
+        report = covary.check_inputs(None, INDEPENDENT)
+        self.assertTrue(report.ok, report)
+        self.assertAlmostEqual(report.independent_mean, float(INDEPENDENT.mean()), 3)
+
+    def test_messages(self):
+        empty = numpy.zeros((3, 0, 4, 3), numpy.float32)
+        self.assertIn("found the shape [3, 0, 4, 3], without values; expected [T, H, W, 3]",
+                      self.message_of(ValueError, covary.combine, empty, empty))
+        flat = numpy.zeros((4, 4, 3), numpy.float32)
+        self.assertIn("found the shape [4, 4, 3]; expected [T, H, W, 3]",
+                      self.message_of(ValueError, covary.combine, flat, flat))
+        self.assertIn("found 'a'; the name must end in .exr,",
+                      self.message_of(covary.UsageError, covary.write_image, "a", flat))
+        films = [covary.film_from_groups(image, 48) for image in (CRN, INDEPENDENT)]
+        self.assertIn("give each its own, in Python by film_from_groups(…, seed=1)",
+                      self.message_of(covary.InputError, covary.merge_films, films))
+        self.assertIn("; did you mean 'iicv'?", self.message_of(covary.UsageError, covary.render, "room", 4, "icv"))
 
     def test_warnings(self):
         """Are issued where the caller is, and kept."""
@@ -54,6 +85,17 @@ class Refusals(PackageTest):
                 result = call(turned, turned[::-1].copy(), force=True)
             self.assertEqual(warned.filename, __file__)
             self.assertIn("was taken for", result.warnings[0])
+
+    def test_frames(self):
+        """The classes of exceptions are those of render()."""
+        def frames(**arguments):
+            return covary.render_frames(**{"scene": "room", "output": self.path / "a_#.exr", "frames": "1", "spp": 1,
+                                           "resolution": (8, 8), **arguments})
+
+        self.assertIn("no such folder", self.message_of(covary.IoError, frames, output=self.path / "no" / "a_#.exr"))
+        self.assertIn("path.json", self.message_of(covary.IoError, frames, camera_path=self.path / "path.json"))
+        frames()
+        self.assertIn("overwrite=True", self.message_of(covary.InputError, frames, spp=2, resume=True))
 
 
 class Watched(PackageTest):

@@ -319,7 +319,7 @@ def interrupt():
     os.kill(os.getpid(), signal.SIGINT)
 threading.Thread(target=interrupt, daemon=True).start()
 try:
-    covary.denoise(numpy.ones((8, 8, 3), "float32"), library=sys.argv[1])
+    covary.denoise(numpy.ones((8, 8, 3), "float32"), oidn=sys.argv[1])
 except KeyboardInterrupt:
     print("interrupted", flush=True)
     os._exit(0)  # not waiting for the library
