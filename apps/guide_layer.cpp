@@ -4,50 +4,32 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <limits>
-#include <span>
+#include <utility>
 
 #include "core/error.h"
 #include "core/printable.h"
+#include "film/auxiliary_features.h"
 #include "film/film_file.h"
 #include "metrics/alignment.h"
 
 namespace covary {
 namespace {
 
-/// Last parts of layer names; layers that see through mirrors and glass come first. Sources: docs/other-renderers.md.
-constexpr std::array<std::string_view, 8> kAlbedo = {
-    "DenoisingAlbedo",   // covary --aovs
-    "Denoising Albedo",  // Blender
-    "denoise_albedo",    // Arnold
-    "Denoise Albedo",    // Octane
-    "Albedo",            // covary, pbrt-v4
-    "albedo",            // Mitsuba 3 by our example, RenderMan, Karma
-    "ALBEDO",            // LuxCore
-    "VRayDiffuseFilter"  // V-Ray
-};
-constexpr std::array<std::string_view, 10> kNormal = {
-    "DenoisingNormal",     // covary --aovs
-    "Denoising Normal",    // Blender
-    "Denoise Normal",      // Octane
-    "Ns",                  // shading normal
-    "N",                   // geometric normal
-    "sh_normal",           // Mitsuba 3
-    "normal",              // RenderMan
-    "AVG_SHADING_NORMAL",  // LuxCore
-    "bump_normals",        // V-Ray
-    "normals"              // V-Ray
-};
-
-constexpr std::array<std::string_view, 3> kPosition = {
-    "P",         // covary --aovs, pbrt-v4, Arnold
-    "Position",  // Blender
-    "position"   // Mitsuba 3 by our example
-};
+const AuxiliaryFeature& feature_of(GuideKind kind) {
+  switch (kind) {
+    case GuideKind::kAlbedo:
+      return kAuxiliaryFeatures[feature::kAlbedo];
+    case GuideKind::kNormal:
+      return kAuxiliaryFeatures[feature::kNormal];
+    case GuideKind::kPosition:
+      break;
+  }
+  return kAuxiliaryFeatures[feature::kPosition];
+}
 
 bool has_three_channels(const std::string& path, const ImageInfo& info, const std::string& layer) {
   const std::vector<std::string> names = layer_channels(path, info.channels, layer);
@@ -75,7 +57,7 @@ void leave_out_bad_pixels(const std::string& name, Image& guide) {
 
 /// The space to convert a guide to; none for vectors, even if their components are called R, G and B.
 std::optional<ColourSpace> space_of(GuideKind kind, const ColourSpace& colours) {
-  return kind == GuideKind::kAlbedo ? std::optional(colours) : std::nullopt;
+  return feature_of(kind).is_colour ? std::optional(colours) : std::nullopt;
 }
 
 Image usable_guide(const std::string& path, const std::string& layer, const std::optional<ColourSpace>& colours) {
@@ -101,14 +83,19 @@ Image guide_from_file(const std::string& path, const ImagePlace& place, const st
 
 std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, GuideKind kind,
                                 const ColourSpace& colours, const Picture& picture) {
-  const std::span<const std::string_view> all[] = {kAlbedo, kNormal, kPosition};
+  const AuxiliaryFeature& first = feature_of(kind);
   const std::vector<std::string> layers = image_layers(info.channels);
-  for (const std::string_view name : all[static_cast<int>(kind)])
-    for (const std::string& layer : layers)
-      if (last_part(without_view(layer, view_of(layer, info.channels))) == name &&
-          belongs_to(picture, layer, info.channels) && has_three_channels(path, info, layer))
-        return usable_guide(path, layer, space_of(kind, colours));
-  return std::nullopt;
+  const auto find = [&](const AuxiliaryFeature& feature) -> std::optional<Image> {
+    for (const std::string_view name : feature.names)
+      for (const std::string& layer : layers)
+        if (last_part(without_view(layer, view_of(layer, info.channels))) == name &&
+            belongs_to(picture, layer, info.channels) && has_three_channels(path, info, layer))
+          return usable_guide(path, layer, space_of(kind, colours));
+    return std::nullopt;
+  };
+  std::optional<Image> behind;
+  if (first.behind != feature::kCount) behind = find(kAuxiliaryFeatures[first.behind]);
+  return behind ? std::move(behind) : find(first);
 }
 
 Image named_guide(const std::string& path, const ImageInfo& info, GuideKind kind, const ColourSpace& colours,
@@ -149,16 +136,17 @@ std::optional<Image> MeanGuide::mean() const {
 
 GuideImages read_guides(const std::string& path, const ImagePlace& place, const ColourSpace& colours) {
   const ImageInfo info = inspect_image(path);
-  const auto own = [&](const char* name, GuideKind kind) -> std::optional<Image> {  // guides that `render` wrote
+  const auto own = [&](feature::Index index, GuideKind kind) -> std::optional<Image> {  // guides that `render` wrote
+    const std::string name = kAuxiliaryFeatures[index].layer;
     const bool is_there = std::any_of(info.channels.begin(), info.channels.end(),
-                                      [&](const auto& c) { return c.name.starts_with(std::string(name) + "."); });
+                                      [&](const auto& c) { return c.name.starts_with(name + "."); });
     return is_there ? filled(named_guide(path, info, kind, colours, name)) : std::nullopt;
   };
   const auto find = [&](GuideKind kind) { return filled(find_guide(path, info, kind, colours)); };
-  GuideImages guides{own("Albedo", GuideKind::kAlbedo),
-                     own("N", GuideKind::kNormal),
-                     own("DenoisingAlbedo", GuideKind::kAlbedo),
-                     own("DenoisingNormal", GuideKind::kNormal),
+  GuideImages guides{own(feature::kAlbedo, GuideKind::kAlbedo),
+                     own(feature::kNormal, GuideKind::kNormal),
+                     own(feature::kDenoisingAlbedo, GuideKind::kAlbedo),
+                     own(feature::kDenoisingNormal, GuideKind::kNormal),
                      info.attributes.contains(std::string("covary:") + film_key::kCleanGuides),
                      find(GuideKind::kPosition)};
   if (!guides.albedo) guides.albedo = find(GuideKind::kAlbedo);

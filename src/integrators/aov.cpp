@@ -15,9 +15,9 @@
 namespace covary {
 namespace {
 
-constexpr size_t kImages = std::size(kAuxiliaryImages);
+constexpr size_t kImages = feature::kCount;
 /// The image P, in scene units.
-constexpr size_t kPosition = 2;
+constexpr size_t kPosition = feature::kPosition;
 /// Samples between checks whether the standard errors of a pixel's means are small enough (measured:
 /// docs/notes/denoising.md).
 constexpr uint32_t kRound = 16;
@@ -211,7 +211,7 @@ void render_aovs(const Scene& scene, const PassSettings& pass, uint32_t most, Fi
     if (pass.progress) pass.progress(n_done += width, n_pixels);
   });
   if (stopped()) return;
-  for (size_t i = 0; i < kImages; ++i) film.aovs[kAuxiliaryImages[i]] = std::move(images[i]);
+  for (size_t i = 0; i < kImages; ++i) film.aovs[kAuxiliaryFeatures[i].layer] = std::move(images[i]);
 }
 
 }  // namespace covary

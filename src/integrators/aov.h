@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Auxiliary images (AOVs): properties of the surfaces behind each pixel.
+// Auxiliary images (AOVs): the auxiliary features of the surfaces behind each pixel.
 #pragma once
 
 #include <atomic>
 
+#include "film/auxiliary_features.h"
 #include "film/film.h"
 #include "passes/render_pass.h"
 
 namespace covary {
-
-/// Names of all auxiliary images, in film.aovs and as layers of files.
-inline constexpr const char* kAuxiliaryImages[] = {"Albedo", "N", "P", "DenoisingAlbedo", "DenoisingNormal"};
 
 /// Maximum number of mirror and glass bounces that are followed to the surface behind.
 inline constexpr int kFollowedBounces = 8;

@@ -181,7 +181,7 @@ TEST(Estimate, GetsAllAuxiliaryImagesAsGuides) {
   });
   const RenderResult result = render(scene, plan, request);
   for (const auto& [name, data] : guided) EXPECT_EQ(data, result.aovs.at(name).data) << name;
-  EXPECT_EQ(guided.size(), std::size(kAuxiliaryImages));
+  EXPECT_EQ(guided.size(), kAuxiliaryFeatures.size());
 }
 
 TEST(Failure, FilmsOfFailedPathLengthsAreKept) {

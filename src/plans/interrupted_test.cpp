@@ -83,7 +83,7 @@ TEST(Interrupted, AFilmThatIsTheOutputSaysThatItIsNotComplete) {
   ASSERT_TRUE(result.interrupted);
   EXPECT_EQ(result.kept, request.output);
   EXPECT_EQ(read_film_attributes(request.output).at("complete"), "false");
-  EXPECT_EQ(read_film(request.output).aovs.size(), std::size(kAuxiliaryImages));
+  EXPECT_EQ(read_film(request.output).aovs.size(), kAuxiliaryFeatures.size());
   request.resume = true;
   EXPECT_TRUE(render(scene, plain_plan(Sampling::kIndependent), request).complete);
   EXPECT_EQ(read_film_attributes(request.output).at("complete"), "true");
@@ -133,7 +133,7 @@ TEST(AuxiliaryImages, AreTimedAsRenderingAndEndWithTheRender) {
   RenderResult result = render(scene, average_plan(), request);
   EXPECT_GT(result.seconds.auxiliary, 0);
   EXPECT_GE(result.render_seconds(), result.seconds.auxiliary + result.passes[0].result.seconds);
-  EXPECT_EQ(result.aovs.size(), std::size(kAuxiliaryImages));
+  EXPECT_EQ(result.aovs.size(), kAuxiliaryFeatures.size());
   EXPECT_TRUE(result.passes[1].film.aovs.empty());
   request.seconds = 1e-6;
   request.spp.reset();
@@ -163,7 +163,7 @@ TEST(AuxiliaryImages, EndAtOnceWhenStopped) {
   EXPECT_TRUE(film.aovs.empty());
   stop = false;
   render_aovs(*scene.scene, settings, 4, film, &stop);
-  EXPECT_EQ(film.aovs.size(), std::size(kAuxiliaryImages));
+  EXPECT_EQ(film.aovs.size(), kAuxiliaryFeatures.size());
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ RenderMemory render_memory(const Plan& plan, std::span<const PassPlan> passes, i
     memory.films += film + (pass.light ? kSplatBytes : 0);
     if (pass.light && plan.makes_film()) memory.estimate += film;  // the sum of both films
   }
-  if (aovs) memory.films += n_pixels * std::size(kAuxiliaryImages) * kImageBytes;
+  if (aovs) memory.films += n_pixels * kAuxiliaryFeatures.size() * kImageBytes;
   // A copy for a viewer or the preview.
   memory.estimate += plan.method->memory.bytes(n_pixels, fewest_groups) + n_pixels * kImageBytes;
   return memory;

@@ -31,7 +31,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
   if (request.output.empty()) return;
   std::map<std::string, Image> aovs = result.aovs;
   if (!request.aovs)  // only needed by the estimator
-    for (const char* name : kAuxiliaryImages) aovs.erase(name);
+    for (const AuxiliaryFeature& feature : kAuxiliaryFeatures) aovs.erase(feature.layer);
   aovs.insert(request.beside.begin(), request.beside.end());
   Film& last = result.passes[camera_passes(result.passes).size() - 1].film;
   if (plan.makes_film()) {

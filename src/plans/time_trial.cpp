@@ -74,7 +74,8 @@ double PlanRun::end_of_band(int n_rows, std::span<const PassPlan> plans) {
     pass.film = made_up_film(scene_.width, scene_.height, band, plan);
   }
   if (needs_aovs())
-    for (const char* name : kAuxiliaryImages) result.aovs[name] = made_up_image(band.width, n_rows);
+    for (const AuxiliaryFeature& feature : kAuxiliaryFeatures)
+      result.aovs[feature.layer] = made_up_image(band.width, n_rows);
   Beside beside;
   if (plan_.method->reads_guides) beside.guides = guides_among(result.aovs);
   const Stopwatch watch;

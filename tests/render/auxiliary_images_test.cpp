@@ -42,8 +42,9 @@ void expect_constant(const Image& image, const Vec3& value) {
 
 TEST(AuxiliaryImages, HaveTheirNames) {
   const std::map<std::string, Image> images = images_of(wall(5, diffuse("0.2")));
-  EXPECT_EQ(images.size(), std::size(kAuxiliaryImages));
-  for (const char* name : kAuxiliaryImages) EXPECT_EQ(images.at(name).data.size(), 3u * kSide * kSide) << name;
+  EXPECT_EQ(images.size(), kAuxiliaryFeatures.size());
+  for (const AuxiliaryFeature& feature : kAuxiliaryFeatures)
+    EXPECT_EQ(images.at(feature.layer).data.size(), 3u * kSide * kSide) << feature.layer;
 }
 
 TEST(AuxiliaryImages, WithoutMirrorsBothKindsHaveTheSameBits) {
