@@ -190,6 +190,8 @@ nlohmann::ordered_json statistics(const Options& o, const CombineRequest& reques
       {"height", request.independent.height},
       {"independent_groups", request.independent.groups},
       {"nonfinite_pixels", combined.image.nonfinite_pixels},
+      {"planned_memory_bytes", combined.planned_memory},
+      {"peak_memory_bytes", peak_memory_bytes()},
       {"seconds", {{"read_and_check", combined.check_seconds}, {"estimate", combined.estimate_seconds}}}};
   if (combined.predicted) add_prediction(*combined.predicted, json);
   add_risks(combined.image.risks, json);

@@ -305,6 +305,16 @@ class Denoise(RenderTest):
         whole, bands = (read_exr((self.path / f"{name}.exr").read_bytes()) for name in ("whole", "bands"))
         self.assertEqual(bands, whole)
 
+    def test_memory_is_told(self):
+        """At least the values of both renders and of the result are planned; the program itself takes more."""
+        size = (24, 16)
+        for name in ("a", "b"):
+            self.write(f"{name}.exr", exr({c: [0.5] * (size[0] * size[1]) for c in "RGB"}, size))
+        facts = json.loads(self.good("denoise", "a.exr", "b.exr", "-o", "out.exr", "--json", "-", "--quiet", "--force",
+                                     *PLAIN).stdout)
+        self.assertGreater(facts["planned_memory_bytes"], 3 * 12 * size[0] * size[1])
+        self.assertGreater(facts["peak_memory_bytes"], facts["planned_memory_bytes"])
+
     def test_layers_add_up(self):
         """Of two renders, with and without a network, by covary denoise and combine."""
         for seed in ("1", "2"):
