@@ -3,6 +3,7 @@
 import contextlib
 import inspect
 import io
+import re
 import sys
 import threading
 import unittest
@@ -114,7 +115,7 @@ class Experiments(PackageTest):
             said = Terminal()
             with contextlib.redirect_stderr(said):
                 covary.experiment(SUITE, self.path / f"out-{progress}", scenes=ROOM.parent, progress=progress)
-            self.assertEqual("\r[0/" in said.getvalue(), seen, said.getvalue())
+            self.assertEqual(re.search(r"\r\[\d/", said.getvalue()) is not None, seen, said.getvalue())
             self.assertTrue(said.getvalue().endswith("\r" if seen else ""))
 
     def test_renderers(self):
