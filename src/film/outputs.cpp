@@ -13,6 +13,7 @@
 #include "film/image_file.h"
 #include "film/image_writer.h"
 #include "film/output_file.h"
+#include "film/output_folder.h"
 
 namespace covary {
 namespace fs = std::filesystem;
@@ -111,6 +112,13 @@ void Outputs::reads(const std::vector<std::string>& paths) {
 
 void Outputs::writes(const std::string& option, const std::string& path, OutputKind kind) {
   if (kind == OutputKind::kText && (path.empty() || path == "-")) return;
+  std::error_code ignored;
+  const fs::path folder = fs::path(path).parent_path();
+  const fs::path holder = folder.has_parent_path() ? folder.parent_path() : fs::path(".");
+  if (!folder.empty() && !fs::exists(folder, ignored) && fs::is_directory(holder, ignored)) {
+    check_extension(option, path, kind);
+    make_output_folder(folder.string());
+  }
   const OutputTarget target = output_target(path);
   if (!target.is_special) check_extension(option, path, kind);
   try_output(target);

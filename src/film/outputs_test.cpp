@@ -87,10 +87,22 @@ TEST(Outputs, NamesSayWhatFilesHold) {
   outputs.writes("--json", "", OutputKind::kText);
 }
 
+TEST(Outputs, TheLastFolderIsMade) {
+  const std::string folder = test_file("made");
+  Outputs outputs;
+  EXPECT_EQ(message_of([&] { outputs.writes("-o", folder + "/a.txt", OutputKind::kFilm); }, ErrorCode::kUsage),
+            "-o '" + folder +
+                "/a.txt': the name must end in .exr; 'covary convert' makes PNG, HDR, PFM, JPEG and TIFF of it");
+  EXPECT_FALSE(fs::exists(folder)) << "nothing will be written";
+  outputs.writes("-o", folder + "/a.exr", OutputKind::kFilm);
+  EXPECT_TRUE(fs::is_directory(folder));
+}
+
 TEST(Outputs, SayBeforeTheWorkThatNothingCanBeWritten) {
   Outputs outputs;
-  EXPECT_TRUE(contains(message_of([&] { outputs.writes("-o", "/nowhere/a.exr", OutputKind::kFilm); }, ErrorCode::kIo),
-                       "cannot write /nowhere/a.exr: no such folder /nowhere"));
+  const char* path = "/nowhere/at/a.exr";
+  EXPECT_TRUE(contains(message_of([&] { outputs.writes("-o", path, OutputKind::kFilm); }, ErrorCode::kIo),
+                       "cannot write /nowhere/at/a.exr: no such folder /nowhere/at"));
   EXPECT_TRUE(contains(message_of([&] { outputs.writes("-o", test_folder(), OutputKind::kFilm); }, ErrorCode::kIo),
                        "it is a folder"));
 }

@@ -266,7 +266,8 @@ class Merge(CliTest):
     def test_output_that_cannot_be_written(self):
         self.write("a.exr", film(1))
         self.write("b.exr", film(2))
-        self.bad(1, "cannot write no/o.exr: no such folder no", "merge", "a.exr", "b.exr", "-o", "no/o.exr")
+        self.bad(1, "cannot write no/no/o.exr: no such folder no/no", "merge", "a.exr", "b.exr", "-o",
+                 "no/no/o.exr")
         self.bad(1, "cannot write .: it is a folder", "merge", "a.exr", "b.exr", "-o", ".")
 
     def test_full_disk_keeps_the_old_file(self):
@@ -345,7 +346,7 @@ class Convert(CliTest):
         self.bad(2, "--exposure: '101': expected a number from -100 to 100", "convert", "a.exr",
                  "a.png", "--exposure", "101")
         self.bad(2, "--exposure", "convert", "a.exr", "a.png", "--exposure", "bright")
-        self.bad(1, "cannot write no/a.png: no such folder no", "convert", "a.exr", "no/a.png")
+        self.bad(1, "cannot write no/no/a.png: no such folder no/no", "convert", "a.exr", "no/no/a.png")
 
 
 class Damage(CliTest):
