@@ -308,7 +308,7 @@ std::string run_one(const Options& o) {
   }
   write(o, place, all, progress);
   const std::optional<PredictedError>& error = all[0].predicted;
-  return o.output + (error ? fmt::format(", predicted relMSE {:.3g}", error->relmse) : "");
+  return o.output + (error ? ", " + prediction_text(*error, std::nullopt) : "");
 }
 
 void run_sequence(const Options& o, const FramePatterns& patterns) {

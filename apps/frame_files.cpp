@@ -17,6 +17,7 @@
 #include "core/stopwatch.h"
 #include "declared_options.h"
 #include "film/image_file.h"
+#include "imageio/exr_image.h"
 #include "motion_checks.h"
 #include "numbers.h"
 #include "sequences/frame_names.h"
@@ -79,13 +80,35 @@ std::string problem_of(const std::string& path, std::optional<ImageInfo>& first)
   }
 }
 
+/// All files of frames that are read, as patterns.
+std::vector<std::string> read_patterns(const FramePatterns& patterns) {
+  std::vector<std::string> all = patterns.images;
+  for (const std::string& other : patterns.others)
+    if (!other.empty() && is_frame_pattern_of_input(other)) all.push_back(other);
+  return all;
+}
+
+/// Takes frames out that a farm has not finished, unless their output is there, and returns them.
+std::vector<int> take_unfinished(std::vector<int>& frames, const FramePatterns& patterns) {
+  const std::vector<std::string> all = read_patterns(patterns);
+  std::vector<int> finished, left;
+  for (const int frame : frames) {
+    const bool is_finished = std::ranges::all_of(
+        all, [&](const std::string& pattern) { return is_complete_exr(frame_name(pattern, frame)); });
+    if (is_finished)
+      finished.push_back(frame);
+    else if (!std::filesystem::exists(frame_name(patterns.output, frame)))
+      left.push_back(frame);
+  }
+  frames = std::move(finished);
+  return left;
+}
+
 /// Reads the headers of all files before the first frame is spent. Throws Error(kInput) naming the first problems.
 void check_frames(const std::vector<int>& frames, const FramePatterns& patterns) {
   constexpr size_t kMostNamed = 5;
-  std::vector<std::string> all = patterns.images, problems;
-  for (const std::string& other : patterns.others)
-    if (!other.empty() && is_frame_pattern_of_input(other)) all.push_back(other);
-  for (const std::string& pattern : all) {
+  std::vector<std::string> problems;
+  for (const std::string& pattern : read_patterns(patterns)) {
     std::optional<ImageInfo> first;
     for (const int frame : frames)
       if (std::string problem = problem_of(frame_name(pattern, frame), first); !problem.empty())
@@ -95,7 +118,8 @@ void check_frames(const std::vector<int>& frames, const FramePatterns& patterns)
   const size_t more = problems.size() - std::min(problems.size(), kMostNamed);
   problems.resize(problems.size() - more);
   throw Error(ErrorCode::kInput,
-              fmt::format("{}{}; nothing was written", fmt::join(problems, "; "),
+              fmt::format("{}{}; nothing was written. --resume leaves out frames whose files are missing or unfinished",
+                          fmt::join(problems, "; "),
                           more > 0 ? fmt::format("; and {} more problems of frames", more) : std::string()));
 }
 
@@ -108,7 +132,8 @@ void add_frame_options(CLI::App& command, FrameOptions& o, const std::string& wh
   add_value(command, "--depth", o.motion.depth, "LAYER", "Layer with the depth, if any")->capture_default_str();
   add_value(command, "--motion-scale", o.motion_scale, "X,Y",
             "Factors that turn motion into pixels to the right and down; 1,-1 if Y points up");
-  command.add_flag("--resume", o.resume, "Of in_####.exr, skip frames whose output exists");
+  command.add_flag("--resume", o.resume,
+                   "Of in_####.exr, skip frames whose output exists, and leave out those whose files are incomplete");
   command.add_flag("--watch", o.watch,
                    "Of in_####.exr, wait for frames and process each when its files are complete, until all of "
                    "--frames are done, --idle or Ctrl-C; denoise: also of folders");
@@ -256,14 +281,20 @@ class Frames {
     return is_done;
   }
 
-  /// The summary; throws Error(kInput) if frames failed.
-  void finish() const {
+  /// The summary; throws Error(kInput) if frames failed, or some are `left` because their files are not complete.
+  void finish(const std::vector<int>& left) const {
     if (!o_.quiet)
       fmt::print(stderr, "{} frames in {:.1f} s{}\n", n_done_, watch_.seconds(),
                  kept_.empty() ? "" : fmt::format("; {} existed already: {}", kept_.size(), text_of(kept_)));
+    const size_t n_all = n_done_ + kept_.size() + failed_.size() + left.size();
+    std::vector<std::string> problems;
     if (!failed_.empty())
-      throw Error(ErrorCode::kInput, fmt::format("{} of {} frames failed: {}", failed_.size(),
-                                                 n_done_ + kept_.size() + failed_.size(), text_of(failed_)));
+      problems.push_back(fmt::format("{} of {} frames failed: {}", failed_.size(), n_all, text_of(failed_)));
+    if (!left.empty())
+      problems.push_back(fmt::format("{} of {} frames are incomplete: {}; files of '{}' are missing or unfinished",
+                                     left.size(), n_all, text_of(left),
+                                     fmt::join(read_patterns(patterns_), "', '")));
+    if (!problems.empty()) throw Error(ErrorCode::kInput, fmt::format("{}", fmt::join(problems, "; ")));
   }
 
  private:
@@ -330,11 +361,8 @@ void watch_frames(const FrameOptions& o, const FramePatterns& patterns, bool has
     }
     return ready.empty() ? Found::kNothing : Found::kWork;
   });
-  const std::vector<int> left = watched.unfinished();
-  if (!left.empty())
-    fmt::print(stderr, "warning: frames {} are incomplete: files of '{}' are missing or unfinished\n", text_of(left),
-               fmt::join(patterns.images, "', '"));
-  if (frames) frames->finish();
+  if (!frames) frames.emplace(o, patterns, std::vector<int>(), has_history, run);
+  frames->finish(watched.unfinished());
 }
 
 }  // namespace
@@ -342,13 +370,14 @@ void watch_frames(const FrameOptions& o, const FramePatterns& patterns, bool has
 void for_each_frame(const FrameOptions& o, const FramePatterns& patterns, bool has_history,
                     const std::function<std::string(int frame, std::shared_ptr<const History> history)>& run) {
   if (o.watch) return watch_frames(o, patterns, has_history, run);
-  const std::vector<int> numbers = frames_of_all(o, patterns);
+  std::vector<int> numbers = frames_of_all(o, patterns);
+  const std::vector<int> left = o.resume ? take_unfinished(numbers, patterns) : std::vector<int>();
   check_frames(numbers, patterns);
   note_gaps(o, numbers, patterns);
   Frames frames(o, patterns, numbers, has_history, run);
   for (size_t i = 0; i < numbers.size(); ++i)
     frames.add(numbers[i], fmt::format("frame {} ({} of {})", numbers[i], i + 1, numbers.size()));
-  frames.finish();
+  frames.finish(left);
 }
 
 }  // namespace covary

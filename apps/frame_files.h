@@ -49,9 +49,9 @@ bool are_frames(const FrameOptions& options, const FramePatterns& patterns);
 /// returns what to say about the frame. Prints a line for each frame, and one for all in the end. The motion comes from
 /// the first file that has the layer; without any, and for files with several pictures, there is no history. Before the
 /// first frame, throws Error(kInput) if files are missing, unreadable, or of another size or channels than the first
-/// frame's. A frame whose call throws Error(kInput) is reported and left out; the next one starts a new history;
-/// Error(kInput) names such frames in the end. With --watch, waits for frames until all are there. Throws Error(kInput)
-/// at once if the motion does not match the frames, or if frames share a seed, which hides shared errors.
+/// frame's; --resume leaves out frames that are missing or unfinished. A frame whose call throws Error(kInput) is left
+/// out; the next one starts a new history. Error(kInput) names all left out in the end. --watch waits for them. Throws
+/// Error(kInput) at once if the motion does not match, or if frames share a seed, which hides shared errors.
 void for_each_frame(const FrameOptions& options, const FramePatterns& patterns, bool has_history,
                     const std::function<std::string(int frame, std::shared_ptr<const History> history)>& run);
 

@@ -16,6 +16,7 @@
 #include "core/error.h"
 #include "core/printable.h"
 #include "core/stopwatch.h"
+#include "film/output_folder.h"
 #include "film/outputs.h"
 #include "settled_files.h"
 #include "usage_error.h"
@@ -80,12 +81,6 @@ class FolderImages {
 
 bool is_denoised_result(const std::string& path) { return is_made_by(path, "denoise"); }
 
-void make_result_folder(const std::string& path) {
-  std::error_code error;
-  fs::create_directory(path, error);
-  if (error) throw Error(ErrorCode::kIo, fmt::format("-o '{}': the folder cannot be made: {}", path, error.message()));
-}
-
 }  // namespace
 
 bool are_folders(const FrameOptions& o, const std::vector<std::string>& inputs, const std::string& output) {
@@ -112,7 +107,7 @@ bool are_folders(const FrameOptions& o, const std::vector<std::string>& inputs, 
 void for_each_image(
     const FrameOptions& o, const std::vector<std::string>& inputs, const std::string& output,
     const std::function<std::string(const std::vector<std::string>& paths, const std::string& result)>& run) {
-  make_result_folder(output);
+  make_output_folder(output);
   FolderImages images(inputs);
   size_t n_done = 0, n_kept = 0;
   std::vector<std::string> failed;
@@ -137,16 +132,18 @@ void for_each_image(
     }
     return ready.empty() ? Found::kNothing : Found::kWork;
   });
-  if (const std::vector<std::string> left = images.unfinished(); !left.empty())
-    fmt::print(stderr, "warning: {} incomplete: unfinished, or missing in one of '{}'\n",
-               printable(fmt::format("{} {}", fmt::join(left, ", "), left.size() == 1 ? "is" : "are")),
-               fmt::join(inputs, "', '"));
   if (!o.quiet)
     fmt::print(stderr, "{} images in {:.1f} s{}\n", n_done, watch.seconds(),
                n_kept > 0 ? fmt::format("; {} existed already", n_kept) : "");
+  const std::vector<std::string> left = images.unfinished();
+  const size_t n_all = n_done + n_kept + failed.size() + left.size();
+  std::vector<std::string> problems;
   if (!failed.empty())
-    throw Error(ErrorCode::kInput, fmt::format("{} of {} images failed: {}", failed.size(),
-                                               n_done + n_kept + failed.size(), fmt::join(failed, ", ")));
+    problems.push_back(fmt::format("{} of {} images failed: {}", failed.size(), n_all, fmt::join(failed, ", ")));
+  if (!left.empty())
+    problems.push_back(fmt::format("{} of {} images are incomplete: {}; unfinished, or missing in one of '{}'",
+                                   left.size(), n_all, fmt::join(left, ", "), fmt::join(inputs, "', '")));
+  if (!problems.empty()) throw Error(ErrorCode::kInput, fmt::format("{}", fmt::join(problems, "; ")));
 }
 
 }  // namespace covary

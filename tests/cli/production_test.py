@@ -87,9 +87,10 @@ class SlowFarm(CliTest):
         farm.start()
         result = self.run_covary(*DENOISE, "--watch", "--idle", "6")
         farm.join()
-        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(result.returncode, 1, result.stderr)
         self.assertIn("waiting for frames 'a.####.exr'; Ctrl-C, or 6 s without a new frame, ends\n", result.stderr)
-        self.assertIn("warning: frames 4 are incomplete", result.stderr)
+        self.assertIn("covary: 1 of 4 frames are incomplete: 4; files of 'a.####.exr', 'b.####.exr' are missing or "
+                      "unfinished\n", result.stderr)
         self.assertRegex(result.stderr, r"\n3 frames in [\d.]+ s\n")
         for n in (1, 2, 3):
             self.write("x.exr", frames["a", n])
@@ -98,6 +99,27 @@ class SlowFarm(CliTest):
             alone, together = (read_exr((self.path / name).read_bytes()) for name in ("alone.exr", f"o.{n:04d}.exr"))
             self.assertEqual(together["R"], alone["R"])
         self.bad(2, "--idle is an option of --watch", *DENOISE, "--idle", "3")
+
+
+class UnfinishedFarm(CliTest):
+    def test_resume_takes_what_is_complete(self):
+        for n in (1, 2, 3):
+            self.write(f"a.{n:04d}.exr", noisy(f"a{n}"))
+        self.write("b.0001.exr", noisy("b1"))
+        self.write("b.0003.exr", noisy("b3")[:700])
+        message = self.bad(1, "b.0002.exr", *DENOISE).stderr
+        self.assertIn("nothing was written. --resume leaves out frames whose files are missing or unfinished", message)
+        self.assertEqual(list(self.path.glob("o.*")), [])
+        for more in ("1 frames in", "0 frames in"):
+            result = self.run_covary(*DENOISE, "--resume")
+            self.assertEqual(result.returncode, 1, result.stderr)
+            self.assertIn(more, result.stderr)
+            self.assertIn("covary: 2 of 3 frames are incomplete: 2-3; files of 'a.####.exr', 'b.####.exr' are missing "
+                          "or unfinished\n", result.stderr)
+            self.assertEqual([p.name for p in self.path.glob("o.*")], ["o.0001.exr"])
+        for n in (2, 3):
+            self.write(f"b.{n:04d}.exr", noisy(f"b{n}"))
+        self.assertIn("2 frames in", self.good(*DENOISE, "--resume").stderr)
 
 
 class WatchedFolder(CliTest):
@@ -149,10 +171,10 @@ class WatchedFolder(CliTest):
         self.assertIn("waiting for images in 'a', 'b'; Ctrl-C, or 5 s without a new one, ends\n", result.stderr)
         self.assertIn("note: a/mine.exr is left out: 'covary denoise' made it\n", result.stderr)
         self.assertRegex(result.stderr, r"warning: bad.exr failed: a/bad.exr: .*\(channels: N Z\)")
-        self.assertIn("warning: half.exr is incomplete: unfinished, or missing in one of 'a', 'b'\n", result.stderr)
-        self.assertRegex(result.stderr, r"\nshot 1.exr: out/shot 1.exr, predicted relMSE [\d.]+\n")
+        self.assertRegex(result.stderr, r"\nshot 1.exr: out/shot 1.exr, predicted relMSE [\d.]+.* \(unreliable: .*\)\n")
         self.assertRegex(result.stderr, r"\n4 images in [\d.]+ s\n")
-        self.assertIn("covary: 1 of 5 images failed: bad.exr", result.stderr)
+        self.assertIn("covary: 1 of 6 images failed: bad.exr; 1 of 6 images are incomplete: half.exr; unfinished, or "
+                      "missing in one of 'a', 'b'\n", result.stderr)
         done = ["lamp.EXR", "late.exr", "shot 1.exr", "slow.exr"]
         self.assertEqual(self.written(), done)
         for name in done:
