@@ -143,21 +143,29 @@ void print_header(const std::string& name, size_t width, const std::vector<std::
   fmt::print("\n");
 }
 
+/// Whether the error where nothing changes is known of any sequence.
+bool have_still(const std::vector<ComparedSequence>& sequences) {
+  return std::ranges::any_of(sequences, [](const auto& s) { return std::isfinite(s.summary().still_relmse); });
+}
+
 void print_errors(const CompareOptions& o, const std::vector<ComparedSequence>& sequences,
                   const std::vector<int>& frames, size_t width) {
   for (const std::string& name : o.metrics) {
     const MetricInfo& info = find_metric(name);
     fmt::print("{} = {}\n", name, formula_text(o, info));
   }
+  const bool is_still = have_still(sequences);
   fmt::print(
       "temporal = relmse of changes since the frame before\n"
-      "temporal-flip = 1/N sum |FLIP of both frames - FLIP of both references|\n"
-      "still = relmse where the references do not change\n");
+      "temporal-flip = 1/N sum |FLIP of both frames - FLIP of both references|\n{}\n",
+      is_still ? "still = relmse where the references do not change" : "the references change everywhere");
   std::vector<std::string> columns = o.metrics;
-  columns.insert(columns.end(), {"temporal", "temporal-flip", "still"});
+  columns.insert(columns.end(), {"temporal", "temporal-flip"});
+  if (is_still) columns.emplace_back("still");
   print_header("image", width, columns);
   const auto row = [&](const std::string& name, std::vector<double> values, const auto& errors) {
-    values.insert(values.end(), {errors.temporal, errors.temporal_flip, errors.still_relmse});
+    values.insert(values.end(), {errors.temporal, errors.temporal_flip});
+    if (is_still) values.push_back(errors.still_relmse);
     print_row(name, width, values);
   };
   for (const ComparedSequence& s : sequences) {

@@ -33,7 +33,7 @@ std::vector<std::vector<std::string>> warn_of_comparison(const std::vector<std::
     for (const ImageFacts& reference : facts) append(comparison_warnings(image, reference), found);
     if (facts.size() == 1) append(reference_warnings(image, facts[0]), found);  // with two, their noise cancels
   }
-  std::set<std::string> printed;
+  static std::set<std::string> printed;  // by this program: sequences have the same references
   for (const auto& warnings : result)
     for (const std::string& warning : warnings)
       if (printed.insert(warning).second) fmt::print(stderr, "warning: {}\n", warning);
