@@ -160,7 +160,7 @@ void experiment(ExperimentCommand command) {
   if (!command.only.empty())
     throw Error(ErrorCode::kUsage, fmt::format("--only chooses parts of a paper ({}); '{}' is a suite",
                                                fmt::join(names_of(lab::builtin_papers()), ", "), command.suite));
-  command.suite = scene_file(command.suite);  // `room` is a scene, too
+  if (!lab::builtin_suites().contains(command.suite)) command.suite = scene_file(command.suite);  // `room`, too
   lab::Suite suite = load_suite(command);
   add_methods_of_programs(programs, true, suite);
   add_methods_of_programs(renderers, false, suite);
@@ -210,20 +210,24 @@ void add_experiment(CLI::App& app) {
   command->add_flag("--quick", o->quick,
                     "Small: 3 seeds, up to 192 samples per pixel, frames of up to 32400 pixels, crops of up to 12000; "
                     "of a paper smaller still, for ten minutes");
-  const auto list = [](CLI::Option* option) { option->delimiter(',')->group("Overriding the suite"); };
   const auto single = [](CLI::Option* option) { option->group("Overriding the suite"); };
-  single(add_value(*command, "--seeds", o->seeds, "SEEDS", "A number of seeds, or seeds separated by commas"));
-  list(command->add_option("--spp", o->spp, "Budgets in samples per pixel")->transform(whole_number(1u, 1u << 30)));
-  list(command->add_option("--time", o->seconds, "Budgets in seconds")->check(positive_number()));
+  add_value(*command, "--seeds", o->seeds, "SEEDS", "A number of seeds, or seeds separated by commas");
+  command->add_option("--spp", o->spp, "Budgets in samples per pixel, separated by commas")
+      ->transform(whole_number(1u, 1u << 30))
+      ->delimiter(',');
+  command->add_option("--time", o->seconds, "Budgets in seconds, separated by commas")
+      ->check(positive_number())
+      ->delimiter(',');
   single(add_value(*command, "--crop", o->overrides.crop, "X,Y,WIDTH,HEIGHT",
                    "X,Y,WIDTH,HEIGHT, or a centred WIDTHxHEIGHT"));
   single(add_value(*command, "--resolution", o->overrides.resolution, "WIDTHxHEIGHT", "Size of the frames"));
   single(add_value(*command, "--size", o->overrides.size, "WIDTHxHEIGHT",
                    "Whole frames, in the scene's own shape, of at most as many pixels, e.g. 1280x720"));
-  // Names may hold commas.
+  // Names may hold commas: lab::apply() tells which separate names.
   single(add_value(*command, "--scenes-only", o->overrides.scenes, "NAME", "Only these scenes"));
-  single(add_value(*command, "--methods-only", o->overrides.methods, "NAME", "Only these methods, and the baseline"));
-  single(add_value(*command, "--baseline", o->overrides.baseline, "NAME", "Method that ratios refer to"));
+  add_value(*command, "--methods-only", o->overrides.methods, "NAME",
+            "Only these methods, separated by commas or spaces, and the baseline");
+  add_value(*command, "--baseline", o->overrides.baseline, "NAME", "Method that ratios refer to");
   single(command
              ->add_option("--reference-spp", o->overrides.reference_spp,
                           "Samples per pixel of each of the two halves of the references")

@@ -6,16 +6,23 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <chrono>
+#include <condition_variable>
 #include <filesystem>
 #include <fstream>
-#include <optional>
+#include <mutex>
 #include <sstream>
+#include <stop_token>
+#include <thread>
+#include <utility>
 
 #include "combine/registry.h"
 #include "commands.h"
 #include "core/content_hash.h"
 #include "core/error.h"
+#include "core/stopwatch.h"
 #include "film/output_file.h"
+#include "film/output_folder.h"
 #include "film/outputs.h"
 #include "interruption.h"
 #include "json_output.h"
@@ -49,16 +56,44 @@ RenderOptions parsed(std::vector<std::string> words, bool of_frames) {
   return options;
 }
 
-/// The experiment's progress, on a separate line; failures stay above it.
-void show_progress(const lab::Progress& p, const std::string& name, ProgressLine& line) {
-  if (p.kind == lab::Progress::Kind::kFailed) {
-    line.clear();
-    fmt::print(stderr, "failed: {}{}\n", name, p.what);
-    return;
+/// The experiment's progress, on a separate line, with the time left while a run takes long; failures stay above it.
+class SuiteProgress {
+ public:
+  SuiteProgress(std::string name, bool quiet) : name_(std::move(name)), line_("", quiet) {}
+  void take(const lab::Progress& p) {
+    const std::lock_guard lock(mutex_);
+    if (p.kind == lab::Progress::Kind::kFailed) {
+      line_.clear();
+      fmt::print(stderr, "failed: {}{}\n", name_, p.what);
+      return;
+    }
+    now_ = p, since_ = Stopwatch();
+    show();
   }
-  const std::string left = p.seconds_left > 0 ? ", " + format_duration(p.seconds_left) + " left" : "";
-  line.show(fmt::format("[{}/{}{}] {}{}", p.done, p.total, left, name, p.what));
-}
+
+ private:
+  void show() {
+    const double left = now_.seconds_left - since_.seconds();
+    line_.show(fmt::format("[{}/{}{}] {}{}", now_.done, now_.total,
+                           left > 0                ? ", " + format_duration(left) + " left"
+                           : now_.seconds_left > 0 ? ", longer than expected"
+                                                   : "",
+                           name_, now_.what));
+  }
+  void show_regularly(const std::stop_token& stop) {
+    std::unique_lock lock(mutex_);
+    while (!end_.wait_for(lock, stop, std::chrono::seconds(1), [&] { return stop.stop_requested(); }))
+      if (now_.total > 0) show();
+  }
+
+  const std::string name_;
+  ProgressLine line_;
+  std::mutex mutex_;  // of all below, and of the line
+  lab::Progress now_;
+  Stopwatch since_;
+  std::condition_variable_any end_;
+  std::jthread showing_{[this](const std::stop_token& stop) { show_regularly(stop); }};  // ends before the others
+};
 
 lab::PlanContext plan_context(const lab::Programs& programs) {
   return {program_version(),
@@ -87,11 +122,7 @@ std::string read_file(const std::string& path) {
   return text.str();
 }
 
-void make_folder(const std::string& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw Error(ErrorCode::kIo, fmt::format("cannot make the folder {}: {}", folder, error.message()));
-}
+void make_folder(const std::string& folder) { make_output_folder(folder); }
 
 void check_files(const ExperimentCommand& command, const lab::Suite& suite, const std::string& scenes,
                  const std::string& folder) {
@@ -152,14 +183,11 @@ lab::ExperimentOptions run_options(const ExperimentCommand& command, const std::
 }
 
 lab::Results run_suite(const lab::Suite& suite, lab::ExperimentOptions options, const std::string& name, bool quiet) {
-  ProgressLine progress("", quiet);
-  std::optional<StopFlag> stop(std::in_place);
-  options.stop = stop->token();
-  options.progress = [&](const lab::Progress& p) { show_progress(p, name, progress); };
-  lab::Results results = lab::run_experiment(suite, options);
-  stop.reset();
-  progress.finish();
-  return results;
+  SuiteProgress progress(name, quiet);
+  const StopFlag stop;
+  options.stop = stop.token();
+  options.progress = [&](const lab::Progress& p) { progress.take(p); };
+  return lab::run_experiment(suite, options);
 }
 
 Written write_results(lab::Results results, const std::string& version, const std::string& folder) {

@@ -95,7 +95,7 @@ std::string help_text(const CLI::App& app, const std::string& name, bool all) {
   } else if (!others.empty()) {
     const auto hidden = std::count_if(command.options.begin(), command.options.end(),
                                       [](const OptionDescription& o) { return o.group != kBasicOptions; });
-    text += fmt::format("\n{} more options, whose defaults suit most pictures: {} --help-all\n", hidden, name);
+    text += fmt::format("\n{} more options, whose defaults suit most purposes: {} --help-all\n", hidden, name);
   }
   text += list_of_commands(app);
   if (all)

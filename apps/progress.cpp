@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kTerminalSeconds = 0.2;               // between two drawings, and lines for another program
 constexpr double kLogSeconds = 10, kLogGrowth = 1.35;  // until the first line of a log, and from one to the next
+constexpr double kShownSeconds = 50;                   // at most, between texts that are shown
 constexpr double kUnknown = 1e9;                       // seconds, until a time limit says more
 constexpr int kUsualColumns = 80, kBarColumns = 30;
 
@@ -181,6 +182,7 @@ void ProgressLine::draw() {
   if (quiet_ || finished_) return;
   const double now = of_line_.seconds();
   next_ = terminal_ || file_of_caller() ? now + kTerminalSeconds : std::max(now + kLogSeconds, now * kLogGrowth);
+  if (!shown_.empty()) next_ = std::min(next_, now + kShownSeconds);
   const int columns = terminal_ ? terminal_columns() - 1 : 1000;  // the last column would wrap the line
   const std::string line = cut_to(text(terminal_ ? columns : kUsualColumns + kBarColumns), columns);
   drawn_ = true;

@@ -9,10 +9,12 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <utility>
 
 #include "command_description.h"
 #include "commands.h"
 #include "core/error.h"
+#include "core/shell_text.h"
 #include "declared_options.h"
 #include "io/scene_formats.h"
 #include "method_options.h"
@@ -158,11 +160,39 @@ void add_output_options(CLI::App& command, RenderOptions& o) {
 
 }  // namespace
 
+namespace {
+
+/// The scene files of a folder and of those in it.
+std::string scenes_in(const std::string& folder) {
+  constexpr size_t kMost = 5;
+  std::vector<std::string> files;
+  std::error_code ignored;
+  for (fs::recursive_directory_iterator it(folder, ignored), end; it != end; it.increment(ignored)) {
+    if (it.depth() > 1) it.disable_recursion_pending();
+    if (it.depth() <= 1 && is_scene_file(it->path().string())) files.push_back(it->path().string());
+  }
+  const auto depth = [](const std::string& path) { return std::count(path.begin(), path.end(), '/'); };
+  std::sort(files.begin(), files.end(), [&](const std::string& a, const std::string& b) {
+    return std::pair(depth(a), a) < std::pair(depth(b), b);
+  });
+  if (files.empty()) return "which holds no scene (.xml, .pbrt, .gltf, .glb)";
+  const size_t more = files.size() - std::min(files.size(), kMost);
+  files.resize(files.size() - more);
+  return fmt::format("not a scene; give one that it holds: {}{}", shell_text(files),
+                     more > 0 ? fmt::format(" and {} more", more) : "");
+}
+
+}  // namespace
+
 std::string scene_file(const std::string& word) {
-  if (fs::exists(word) || fs::path(word).filename() != word) return word;
+  std::error_code ignored;
+  const bool is_folder = fs::is_directory(word, ignored);
+  if (!is_folder && (fs::exists(word) || fs::path(word).filename() != word)) return word;
   const std::map<std::string, std::string> files = builtin_scenes();
   const auto found = files.find(word);
-  return found == files.end() ? word : found->second;
+  if (found != files.end()) return found->second;
+  if (is_folder) throw Error(ErrorCode::kUsage, fmt::format("'{}' is a folder, {}", word, scenes_in(word)));
+  return word;
 }
 
 std::string program_path() { return fs::read_symlink("/proc/self/exe").string(); }

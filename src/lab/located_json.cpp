@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/json_depth.h"
+#include "core/printable.h"
 
 namespace covary::lab {
 namespace {
@@ -46,7 +47,8 @@ class CountingIterator {
 /// Handles the parser's events: builds the value and records lines.
 class Builder : public nlohmann::json_sax<Json> {
  public:
-  Builder(LocatedJson& document, const int& line) : document_(document), line_(line) {}
+  Builder(LocatedJson& document, const std::string& text, const int& line)
+      : document_(document), text_(text), line_(line) {}
 
   bool null() override { return add(nullptr); }
   bool boolean(bool v) override { return add(v); }
@@ -65,10 +67,21 @@ class Builder : public nlohmann::json_sax<Json> {
     key_ = name;
     return true;
   }
-  bool parse_error(std::size_t, const std::string& token, const nlohmann::detail::exception& error) override {
+  /// `position`: of the last character that was read, counted from 1.
+  bool parse_error(std::size_t position, const std::string&, const nlohmann::detail::exception& error) override {
     std::string what = error.what();
     what = what.substr(std::min(what.find(": syntax error"), what.size() - 2) + 2);
-    fail(line_, fmt::format("not JSON near '{}': {}", token, what));
+    const size_t at = std::min(std::max<size_t>(position, 1) - 1, text_.size());
+    const size_t first = at == 0 ? 0 : text_.rfind('\n', at - 1) + 1;  // npos + 1 == 0
+    const std::string line = text_.substr(first, text_.find('\n', at) - first);
+    const auto number = std::count(text_.begin(), text_.begin() + static_cast<ptrdiff_t>(first), '\n') + 1;
+    const size_t before = at == 0 ? std::string::npos : text_.find_last_not_of(" \t\r\n", at - 1);
+    const bool is_comma = before != std::string::npos && text_[before] == ',' && at < text_.size() &&
+                          (text_[at] == ']' || text_[at] == '}');
+    throw Error(ErrorCode::kInput,
+                fmt::format("{}:{}:{}: not JSON: {}{}; the line is '{}'", document_.name, number, at - first + 1,
+                            is_comma ? "no comma may stand before the end of a list or object; " : "", what,
+                            printable(line)));
   }
 
  private:
@@ -108,6 +121,7 @@ class Builder : public nlohmann::json_sax<Json> {
   }
 
   LocatedJson& document_;
+  const std::string& text_;
   const int& line_;
   std::vector<Json*> open_;  // the addresses stay valid: a container only grows while it is the innermost
   std::vector<std::string> pointer_;
@@ -137,7 +151,7 @@ LocatedJson parse_located(const std::string& text, const std::string& name) {
   LocatedJson document;
   document.name = name;
   int line = 1;
-  Builder builder(document, line);
+  Builder builder(document, text, line);
   Json::sax_parse(CountingIterator(text.data(), &line), CountingIterator(text.data() + text.size(), &line), &builder);
   return document;
 }

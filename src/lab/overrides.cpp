@@ -13,11 +13,26 @@
 namespace covary::lab {
 namespace {
 
+/// The names that are meant: words that are no names, as names may hold commas, are names separated by commas.
+std::vector<std::string> split_names(const std::vector<std::string>& words, const std::vector<std::string>& known) {
+  std::vector<std::string> names;
+  for (const std::string& word : words) {
+    const bool is_name = std::find(known.begin(), known.end(), word) != known.end();
+    for (size_t at = 0; at <= word.size();) {
+      const size_t end = is_name ? word.size() : std::min(word.find(',', at), word.size());
+      names.push_back(word.substr(at, end - at));
+      at = end + 1;
+    }
+  }
+  return names;
+}
+
 /// Keeps only the named entries; every name must exist.
 template <typename Entry>
-void keep(const char* what, const std::vector<std::string>& names, std::vector<Entry>& entries) {
+void keep(const char* what, const std::vector<std::string>& words, std::vector<Entry>& entries) {
   std::vector<std::string> known;
   for (const Entry& entry : entries) known.push_back(entry.name);
+  const std::vector<std::string> names = split_names(words, known);
   for (const std::string& name : names)
     if (std::find(known.begin(), known.end(), name) == known.end())
       throw Error(ErrorCode::kUsage, fmt::format("the suite has no {} '{}'{}; it has '{}'", what, name,

@@ -209,6 +209,13 @@ std::vector<const Summary*> comparable(const Results& results, size_t budget) {
   return all;
 }
 
+/// Two digits, without an exponent: 0.73, 19, 6300.
+std::string factor_text(double value) {
+  if (!(value >= 100) || !std::isfinite(value)) return fmt::format("{:.2g}", value);
+  const double unit = std::pow(10, std::floor(std::log10(value)) - 1);
+  return fmt::format("{:.0f}", std::round(value / unit) * unit);
+}
+
 /// "At equal samples (192 spp) balanced has the lowest error: 8.1 times lower than pt (7.0 to 9.4). Not clearly worse:
 /// error." Empty if nothing is significantly better than the baseline.
 std::string verdict(const Results& results, size_t budget, const std::string& condition, Estimate Summary::*ratio) {
@@ -224,10 +231,15 @@ std::string verdict(const Results& results, size_t budget, const std::string& co
   if (!(gain.value > 1))
     return fmt::format("{} no method has less error than '{}'; next is '{}', with {:.2g} times as much.", condition,
                        suite.baseline, suite.methods[best->method].name, 1 / gain.value);
-  std::string text = fmt::format("{} '{}' has the lowest error: {:.2g} times lower than '{}'", condition,
-                                 suite.methods[best->method].name, gain.value, suite.baseline);
+  const std::string range = fmt::format("({} to {})", factor_text(gain.low), factor_text(gain.high));
+  if (gain.low <= 1)
+    return fmt::format("{} no method has clearly less error than '{}': that of '{}' is {} times lower {}, which these "
+                       "seeds and scenes do not tell from 1.",
+                       condition, suite.baseline, suite.methods[best->method].name, factor_text(gain.value), range);
+  std::string text = fmt::format("{} '{}' has the lowest error: {} times lower than '{}'", condition,
+                                 suite.methods[best->method].name, factor_text(gain.value), suite.baseline);
   if (!std::isfinite(gain.low)) return text + ".";
-  text += fmt::format(" ({:.2g} to {:.2g}).", gain.low, gain.high);
+  text += fmt::format(" {}.", range);
   std::vector<std::string> as_good;
   for (const Summary* s : all)
     if (s != best && (s->*ratio).high >= gain.low) as_good.push_back(suite.methods[s->method].name);

@@ -267,6 +267,15 @@ TEST(ReportDocument, SaysWhichMethodHasTheLeastError) {
       << "a method that lacks a scene does not count";
   EXPECT_EQ(verdicts(results, 1),
             std::vector<std::string>{"At equal time (10 s) 'iicv' has the lowest error: 2 times lower than 'pt'."});
+  results.summaries = {summary(0, 0, 2, one, one), summary(1, 0, 2, {19, kNone, 0.73, 500}, {})};
+  EXPECT_EQ(verdicts(results, 0),
+            std::vector<std::string>{"At equal samples (24 spp) no method has clearly less error than 'pt': that of "
+                                     "'iicv' is 19 times lower (0.73 to 500), which these seeds and scenes do not tell "
+                                     "from 1."});
+  results.summaries = {summary(0, 0, 2, one, one), summary(1, 0, 2, {6331, kNone, 152, 4924207}, {})};
+  EXPECT_EQ(verdicts(results, 0),
+            std::vector<std::string>{"At equal samples (24 spp) 'iicv' has the lowest error: 6300 times lower than "
+                                     "'pt' (150 to 4900000)."});
 }
 
 TEST(ReportDocument, ShowsTheBudgetOfTheSuite) {

@@ -663,6 +663,31 @@ class BuiltIn(ExperimentTest):
         done = self.run_covary([COVARY, "experiment", "guiding-scenes", "--print", "--methods-only", "path",
                                 "guided, cv rgb"])
         self.assertEqual([m["name"] for m in json.loads(done.stdout)["methods"]], ["path", "guided, cv rgb"])
+        done = self.run_covary([COVARY, "experiment", "room", "--print", "--methods-only", "pt,default,iicv"])
+        self.assertEqual([m["name"] for m in json.loads(done.stdout)["methods"]], ["pt", "default", "iicv"])
+        done = self.run_covary([COVARY, "experiment", "room", "--print", "--methods-only", "pt,iicvv"])
+        self.assertIn("the suite has no method 'iicvv'; did you mean 'iicv'", done.stderr)
+
+    def test_a_folder_is_refused_with_its_scenes(self):
+        (self.path / "kitchen" / "more").mkdir(parents=True)
+        for name in ("scene_v3.xml", "more/scene.pbrt", "notes.txt"):
+            (self.path / "kitchen" / name).write_text("")
+        for command in (("experiment", "kitchen", "--print"), ("render", "kitchen", "-o", "a.exr")):
+            done = self.run_covary([COVARY, *command])
+            self.assertEqual(done.returncode, 2)
+            self.assertIn("'kitchen' is a folder, not a scene; give one that it holds: kitchen/scene_v3.xml "
+                          "kitchen/more/scene.pbrt\n", done.stderr)
+
+    def test_a_comma_too_many(self):
+        (self.path / "s.json").write_text('{\n "budgets": [{"spp": 4},\n ]\n}')
+        done = self.run_covary([COVARY, "experiment", "s.json", "--print"])
+        self.assertIn("s.json:3:2: not JSON: no comma may stand before the end of a list or object; ", done.stderr)
+        self.assertIn("; the line is ' ]'\n", done.stderr)
+
+    def test_the_help_shows_what_is_usual(self):
+        text = self.run_covary([COVARY, "experiment", "--help"]).stdout
+        for option in ("--spp", "--time", "--seeds", "--methods-only", "--baseline"):
+            self.assertIn(option + " ", text)
 
     def test_one_scene(self):
         done = self.run_covary([COVARY, "experiment", str(SCENES / "room.xml"), "--quick", "-o", "out", "--resolution",
