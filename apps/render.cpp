@@ -24,6 +24,8 @@
 #include "json_output.h"
 #include "live.h"
 #include "method_options.h"
+#include "plans/made_file.h"
+#include "plans/made_of.h"
 #include "plans/render.h"
 #include "plans/result_files.h"
 #include "progress.h"
@@ -196,6 +198,18 @@ void warn_of_scene(const RenderOptions& options, const LoadedScene& scene) {
 
 namespace {
 
+/// Whether --resume finds a picture that has the wanted error already; says so.
+bool is_there(const RenderOptions& options, const RenderRequest& request) {
+  if (!request.resume || !request.passes.empty() || !options.json.empty() || !options.stages.empty()) return false;
+  const MadeFile file = made_file(request.output);
+  if (!reaches(file, request.attributes.at(film_key::kMadeOf), relmse_goal(request))) return false;
+  if (!options.quiet)
+    fmt::print(stderr, "{}: complete, with a predicted relMSE of {:.3g}; nothing to render (--overwrite instead of "
+                       "--resume renders it again)\n",
+               request.output, *file.predicted);
+  return true;
+}
+
 /// Tells the page, if there is one, how the render has ended, whatever ends it.
 struct PageEnd {
   LiveRender* live;
@@ -248,9 +262,10 @@ void render(RenderOptions options) {
     if (options.sequence.is_sequence()) place_frame(options, scene);
     return print_replay(options, scene);
   }
+  const RenderRequest request = make_request(options, scene);
+  if (!live && is_there(options, request)) return progress.finish();
   std::optional<StopFlag> stop(std::in_place);
-  const RenderResult result =
-      render_watched(options, scene, make_request(options, scene), display.get(), progress, *stop, live.get());
+  const RenderResult result = render_watched(options, scene, request, display.get(), progress, *stop, live.get());
   const std::optional<Unfinished> missed =
       report_with_page({options, scene, result, load_seconds, threads, progress.phase()}, *stop, page);
   stop.reset();  // there is nothing more to save

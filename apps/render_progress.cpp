@@ -7,6 +7,7 @@
 
 #include "core/processor_time.h"
 #include "plans/budget.h"
+#include "plans/first_check.h"
 
 namespace covary {
 namespace {
@@ -36,7 +37,8 @@ RenderProgress::RenderProgress(const RenderOptions& options, const LoadedScene& 
     : options_(options), line_(line) {
   const CropWindow window = window_of(scene, request);
   n_pixels_ = static_cast<double>(window.width) * window.height;
-  n_samples_ = request.seconds > 0 && !request.spp ? kUnknownSamples : n_pixels_ * first_budget(scene, request);
+  const bool is_unknown = request.seconds > 0 && !request.spp;
+  n_samples_ = is_unknown ? kUnknownSamples : n_pixels_ * samples_before_check(scene, make_plan(options), request);
   estimate_work_ = work_of_estimate(options, n_pixels_);
   threads_ = static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   auxiliary_begun_ = !request.aovs && !estimator_of(options).reads_guides;

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <map>
 #include <span>
 #include <utility>
 #include <vector>
@@ -21,6 +20,7 @@
 #include "passes/motion.h"
 #include "plans/budget.h"
 #include "plans/camera_path.h"
+#include "plans/made_file.h"
 #include "plans/made_of.h"
 #include "plans/pass_files.h"
 #include "sequences/feature_slopes.h"
@@ -76,16 +76,12 @@ std::string frame_made_of(const RenderOptions& one, const LoadedScene& scene, co
 }
 
 /// Whether the file is the complete frame. Throws if it is a complete image of something else.
-bool is_complete(const std::string& path, const std::string& made_of) {
+bool is_complete(const std::string& path, const std::string& made_of, double until) {
   if (!fs::exists(path)) return false;
-  const std::map<std::string, std::string> attributes = inspect_image(path).attributes;
-  const auto value = [&](const char* key) {
-    const auto it = attributes.find(std::string("covary:") + key);
-    return it == attributes.end() ? std::string() : it->second;
-  };
-  if (value(film_key::kComplete) == "false") return false;
-  const std::string earlier = value(film_key::kMadeOf);
-  if (earlier == made_of) return true;
+  const MadeFile file = made_file(path);
+  if (!file.complete) return false;
+  const std::string& earlier = file.made_of;
+  if (earlier == made_of || reaches(file, made_of, until)) return true;
   throw Error(
       ErrorCode::kInput,
       fmt::format("--resume: '{}' is not a frame of this command ({}); --overwrite instead of --resume replaces "
@@ -159,8 +155,10 @@ class SequenceRender {
 
   void run() {
     check(options_);
+    const Plan plan = make_plan(options_);
     for (const int frame : frames_) {
       outputs_.push_back(files_of(frame_options(options_, frame)));
+      check_earlier_films(plan, frame_options(options_, frame).request());
       if (const std::string scene = frame_options(options_, frame).scene; has_many_scenes() && !fs::exists(scene))
         throw Error(ErrorCode::kIo, fmt::format("cannot read '{}', the scene of frame {}: no such file", scene, frame));
       if (!options_.sequence.camera_path.empty()) outputs_.back().reads(options_.sequence.camera_path);
@@ -210,7 +208,7 @@ class SequenceRender {
     times_.place(frame, now, *scene_);
     const std::string made_of = frame_made_of(one, *scene_, now, before, follows ? last_made_of_ : "");
     last_frame_ = frame, last_made_of_ = made_of, last_camera_ = now;
-    if (request.resume && is_complete(request.output, made_of)) {
+    if (request.resume && is_complete(request.output, made_of, relmse_goal(request))) {
       if (!options_.quiet) fmt::print(stderr, "{}: complete\n", request.output);
       return;
     }

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a render tells its user at the end: what was written, where the time went, how good it is, what would help next.
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <sstream>
 #include <string>
 
 #include "core/shell_text.h"
@@ -78,8 +81,10 @@ std::string next_text(const RenderReport& report, const PhaseTimes& times) {
   const RenderResult& result = report.result;
   if (!missing_network(o.settings.denoising).empty() || o.sequence.is_sequence()) return "";  // it is said
   if (result.of_time) return fmt::format("`{}` instead of --time makes the same image", result.of_time->text());
-  if (times.auxiliary + times.estimate > kMostTime * times.total() && times.total() > kLongSeconds)
-    return "more samples cost little here: most of the time is the same for any number";
+  const bool is_fixed = times.auxiliary + times.estimate > kMostTime * times.total() && times.total() > kLongSeconds;
+  if (is_fixed && result.predicted && o.request().until <= 0)
+    return fmt::format("`--spp {:g}` takes much less than four times as long: most of this time was not for samples",
+                       4 * std::round(result.samples_per_pixel()));
   if (!o.request().passes.empty())
     return fmt::format("`--resume --spp {:g}` adds to the samples in {}", 4 * std::round(result.samples_per_pixel()),
                        shell_text({o.request().passes}));
@@ -144,13 +149,27 @@ void print_frame(const RenderReport& report, const std::string& frame) {
              seconds_text(times.total() - times.loading), report.result.predicted ? "; " + quality_text(report) : "");
 }
 
+namespace {
+
+/// Whether the shell would find it.
+bool is_program(const std::string& name) {
+  const char* path = std::getenv("PATH");
+  std::istringstream folders(path ? path : "");
+  for (std::string folder; std::getline(folders, folder, ':');)
+    if (access((folder + "/" + name).c_str(), X_OK) == 0) return true;
+  return false;
+}
+
+}  // namespace
+
 void print_frames(const RenderOptions& options, int n_made, int n_frames, const PhaseTimes& times) {
   const std::string& output = options.request().output;
   const std::string made = n_made == n_frames ? fmt::format("{} frame{}", n_frames, n_frames > 1 ? "s" : "")
                                               : fmt::format("{} of {} frames; the others were there", n_made, n_frames);
   fmt::print(stderr, "{}: {}\ntime: {}\n", output, made, text_of(times, estimate_name(options)));
   if (n_frames > 1)
-    fmt::print(stderr, "next: `covary convert {} {}` makes a video\n", shell_text({output}), "video.mp4");
+    fmt::print(stderr, "next: `covary convert {} {}` makes a video{}\n", shell_text({output}), "video.mp4",
+               is_program("ffmpeg") ? "" : ", with ffmpeg, which is not installed");
 }
 
 }  // namespace covary

@@ -5,11 +5,16 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <set>
 #include <sstream>
 
 #include "core/error.h"
+#include "core/number_text.h"
+#include "film/film.h"
+#include "film/film_file.h"
 #include "film/image_file.h"
+#include "plans/made_file.h"
 
 namespace covary {
 namespace {
@@ -80,18 +85,31 @@ std::string differences(const std::string& earlier, const std::string& now, bool
   return text;
 }
 
-void check_made_alike(const std::string& path, const std::string& made_of, bool continues) {
+MadeFile made_file(const std::string& path) {
   std::error_code ignored;
-  if (!std::filesystem::is_regular_file(path, ignored)) return;
+  if (!std::filesystem::is_regular_file(path, ignored)) return {};
   std::map<std::string, std::string> attributes;
   try {
     attributes = inspect_image(path, ChecksumPolicy::kIgnore).attributes;
   } catch (const Error&) {
-    return;  // not an image
+    return {};  // not an image
   }
-  const auto found = attributes.find(std::string("covary:") + film_key::kMadeOf);
-  if (found == attributes.end()) return;
-  if (const std::string differ = differences(found->second, made_of, continues); !differ.empty())
+  const auto value = [&](const char* key) {
+    const auto found = attributes.find(std::string("covary:") + key);
+    return found == attributes.end() ? std::string() : found->second;
+  };
+  return {value(film_key::kMadeOf), value(film_key::kComplete) != "false", parse_real(value(film_key::kPredicted))};
+}
+
+bool reaches(const MadeFile& file, const std::string& made_of, double until) {
+  return file.complete && !file.made_of.empty() && file.predicted && *file.predicted <= until &&
+         differences(file.made_of, made_of, true).empty();
+}
+
+void check_made_alike(const std::string& path, const std::string& made_of, bool continues) {
+  const MadeFile file = made_file(path);
+  if (file.made_of.empty()) return;
+  if (const std::string differ = differences(file.made_of, made_of, continues); !differ.empty())
     throw Error(ErrorCode::kInput, fmt::format("{}'{}' was rendered with other settings ({}); give another name, or "
                                                "`overwrite` to replace it",
                                                continues ? "`resume`: " : "", path, differ));

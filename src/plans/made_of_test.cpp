@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+
+#include "plans/made_file.h"
+
 namespace covary {
 namespace {
 
@@ -35,6 +39,17 @@ TEST(MadeOf, NamesPlacesWithoutTheirHashes) {
   };
   EXPECT_EQ(differences(at("12ab", "34"), at("56cd", "34")), "another place of the camera");
   EXPECT_EQ(differences(at("12ab", "34"), at("12ab", "56")), "another previous frame");
+}
+
+TEST(MadeOf, AnotherGoalMayBeReachedAlready) {
+  const std::string made = made_of("h", {{{"until", "relmse=0.01"}, {"seed", "2"}}});
+  const std::string now = made_of("h", {{{"until", "relmse=0.008"}, {"seed", "2"}}});
+  EXPECT_TRUE(reaches({made, true, 0.003}, now, 0.008));
+  EXPECT_FALSE(reaches({made, true, 0.009}, now, 0.008));
+  EXPECT_FALSE(reaches({made, false, 0.003}, now, 0.008)) << "interrupted";
+  EXPECT_FALSE(reaches({made, true, std::nullopt}, now, 0.008));
+  EXPECT_FALSE(reaches({made, true, 0.003}, made_of("h", {{{"until", "relmse=0.008"}}}), 0.008)) << "another seed";
+  EXPECT_FALSE(reaches(made_file("/no/such.exr"), now, 0.008));
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "passes/sample_parts.h"
 #include "passes/training.h"
 #include "plans/budget.h"
+#include "plans/first_check.h"
 #include "plans/integrator_choice.h"
 #include "plans/light_plan.h"
 #include "plans/render.h"
@@ -43,7 +44,7 @@ RenderMemory render_memory(const Plan& plan, std::span<const PassPlan> passes, i
 
 RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const RenderRequest& request) {
   PlanState state{scene, request, nullptr, nullptr, 0, 0, {}};
-  state.budget = state.group_budget = first_budget(scene, request);
+  state.budget = state.group_budget = samples_before_check(scene, plan, request);
   const CropWindow window = window_of(scene, request);
   std::vector<PassPlan> passes;
   for (const Phase& phase : plan.phases)

@@ -12,6 +12,7 @@
 #include "passes/light_pass.h"
 #include "passes/training.h"
 #include "plans/budget.h"
+#include "plans/first_check.h"
 #include "plans/folder_lock.h"
 #include "plans/integrator_choice.h"
 #include "plans/light_plan.h"
@@ -52,7 +53,7 @@ PlanRun::PlanRun(const LoadedScene& scene, const Plan& plan, const RenderRequest
       filter_(request.filter.value_or(scene.filter)),
       integrator_(prepared_integrator(scene, plan, request)),
       state_{scene, request_, callbacks.stop, integrator_, 0, 0, {}},
-      rounds_(first_budget(scene, request)),
+      rounds_(samples_before_check(scene, plan, request)),
       aov_samples_(request.aov_samples) {
   plan_.traces_light = has_light_pass(scene, plan, request);
 }
@@ -133,7 +134,6 @@ bool PlanRun::render_to_limits() {
       keep_films_before_more();
       if (!estimate()) return false;
     }
-    if (request_.until > 0) result_.until_reached = error_to_limit() <= request_.until;
     if (callbacks_.predicted && result_.predicted)
       callbacks_.predicted(request_.until_in_blocks
                                ? PredictedError{error_to_limit(), std::nullopt, result_.predicted->doubt}
@@ -142,9 +142,10 @@ bool PlanRun::render_to_limits() {
     const bool out_of_time = timed() && seconds_left(plan_.phases.size() - 1, 1) <= 0;
     if (!out_of_time && wants_more()) continue;
     const uint32_t limit = largest_budget(scene_, request_);
-    if (request_.until > 0) result_.until_reached = error_to_limit() <= request_.until;
+    const double error = out_of_time ? error_to_limit() : surely_at_most();
+    if (request_.until > 0) result_.until_reached = error <= request_.until;
     if (result_.until_reached.value_or(true) || state_.budget >= limit || out_of_time) return true;
-    rounds_.add(next_budget(state_.budget, error_to_limit(), request_.until, limit,
+    rounds_.add(next_budget(state_.budget, error, request_.until, limit,
                             result_.predicted->doubt.empty() ? kMostGrowth : kDoubtfulGrowth));
     state_.budget = rounds_.budget();
   }

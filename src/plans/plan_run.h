@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -85,6 +86,14 @@ class PlanRun {
   /// The error that RenderRequest::until limits.
   double error_to_limit() const {
     return request_.until_in_blocks ? result_.predicted_blocks : result_.predicted->relmse;
+  }
+  /// The same, or after few samples the upper end of its interval, so that a render does not end by chance; infinite if
+  /// there is none.
+  double surely_at_most() const {
+    if (state_.budget >= first_budget(scene_, request_)) return error_to_limit();
+    const PredictedError& predicted = *result_.predicted;
+    if (!predicted.bounds) return std::numeric_limits<double>::infinity();
+    return error_to_limit() * (predicted.bounds->high / predicted.relmse);
   }
   /// A film that is the image needs no estimate, except for its error, which its groups tell, or for layers.
   bool needs_estimate() const {

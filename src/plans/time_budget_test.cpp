@@ -5,6 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
+
+#include "plans/end_trials.h"
 
 namespace covary {
 namespace {
@@ -29,6 +32,35 @@ TEST(PlanTime, KnowsWhatTheLeastTakes) {
   EXPECT_EQ(plan.samples, 4u);
   EXPECT_NEAR(plan.seconds, 20 + 0.47 + 4 * 1.8, 1e-9);
   EXPECT_EQ(plan_time(kRoom, 28.5, 4, 64).aov_samples, 2u) << "(28.5 - 20 - 4 * 1.8) / 0.47 = 2.8";
+}
+
+/// An end that takes most of the time is not shortened much by leaving out samples.
+TEST(PlanTime, GivesSamplesAShareOfATimeThatIsTooShort) {
+  const TimePlan plan = plan_time({0.01, 0, 12}, 5, 1, 0);
+  EXPECT_EQ(first_round(plan, 1), 75u) << "0.15 * 5 / 0.01";
+  EXPECT_GT(plan.seconds, 12.75);
+}
+
+/// The seconds of each trial of an end that takes `load` at first, and 0.1 s for each row.
+std::vector<double> trials_of(int height, double allowed, double load, double* end) {
+  std::vector<double> all;
+  *end = time_of_end(height, allowed, [&](int rows) {
+    all.push_back(0.1 * rows + (all.empty() ? load : 0));
+    return all.back();
+  });
+  return all;
+}
+
+TEST(TimeOfEnd, TrialsTakeNoMoreThanTheirShare) {
+  double end = 0;
+  EXPECT_EQ(trials_of(200, 100, 1, &end).size(), 3u);
+  EXPECT_NEAR(end, 20, 1e-9);
+  EXPECT_EQ(trials_of(200, 6, 1, &end).size(), 2u) << "2.6 + 1.6 + 4.8 > 6";
+  EXPECT_NEAR(end, 20, 1e-9);
+  EXPECT_EQ(trials_of(200, 4, 1, &end).size(), 1u) << "the second might take as long as the first";
+  EXPECT_NEAR(end, 32.5, 1e-9) << "with what loads once";
+  EXPECT_EQ(trials_of(40, 100, 1, &end).size(), 2u);
+  EXPECT_NEAR(end, 4, 1e-9);
 }
 
 /// Renders with a pilot that errs by `pilot`, and a machine that takes `load` times as long while the passes run.

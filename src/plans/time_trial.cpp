@@ -15,6 +15,7 @@
 #include "film/film_file.h"
 #include "integrators/aov.h"
 #include "passes/training.h"
+#include "plans/end_trials.h"
 #include "plans/pass_files.h"
 #include "plans/plan_run.h"
 #include "plans/result_files.h"
@@ -24,8 +25,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Rows of two trials of the estimate, whose difference leaves out what does not depend on the size.
-constexpr int kFewRows = 16, kMoreRows = 48;
 /// A trial of training takes one pixel in each square of this side. Training that takes a larger share of the time is
 /// told beforehand.
 constexpr int kTrainingStride = 8;
@@ -126,13 +125,8 @@ std::vector<PassPlan> PlanRun::passes_with(uint32_t group_budget) const {
 double PlanRun::time_of_end(double seconds_per_sample) {
   const std::vector<PassPlan> plans = passes_with(static_cast<uint32_t>(
       std::clamp(0.5 * request_.seconds / seconds_per_sample, 1.0, static_cast<double>(state_.budget))));
-  const int height = window_.height;
-  end_of_band(std::min(height, kFewRows), plans);  // loads and warms what the others use
-  const double few = end_of_band(std::min(height, kFewRows), plans);
-  if (height <= kMoreRows) return few * height / std::min(height, kFewRows);
-  const double more = end_of_band(kMoreRows, plans);
-  const double per_row = std::max(more - few, more / kMoreRows * (kMoreRows - kFewRows) / 2) / (kMoreRows - kFewRows);
-  return more + per_row * (height - kMoreRows);
+  return covary::time_of_end(window_.height, kTrialShare * request_.seconds,
+                             [&](int rows) { return end_of_band(rows, plans); });
 }
 
 TimeCosts PlanRun::measure_costs() {

@@ -143,6 +143,18 @@ class Until(RenderTest):
             self.assertEqual("; that is unreliable: " in result.stderr, doubt, result.stderr)
             self.assertIn(f"covary:budgets: {budgets}\n", self.good("info", f"{scene}/crn.exr").stdout)
 
+    def test_a_goal_that_is_met_is_not_rendered_again(self):
+        render = ("render", ROOM, "--resolution", "64x48", "--no-preview", "-o", "made/a.exr", "--oidn", "off")
+        self.good(*render, "--until", "relmse=0.05")
+        before = (self.path / "made/a.exr").read_bytes()
+        result = self.good(*render, "--until", "relmse=0.04", "--resume")
+        said = re.search(r"(?m)^made/a.exr: complete, with a predicted relMSE of (0.0\d+); nothing to ", result.stderr)
+        self.assertTrue(said, result.stderr)
+        self.assertEqual((self.path / "made/a.exr").read_bytes(), before)
+        self.assertNotIn("nothing to render", self.good(*render, "--until", f"relmse={0.7 * float(said[1])}",
+                                                          "--resume").stderr)
+        self.assertNotEqual((self.path / "made/a.exr").read_bytes(), before)
+
     def test_reached(self):
         facts = json.loads(self.good("render", ROOM, *SMALL, "-o", "a.exr", "--until", "relmse=0.5", "--json",
                                      "-").stdout)

@@ -175,6 +175,16 @@ class Frames(SequenceTest):
             attributes = json.loads(self.good("info", f"f_00{n}.exr", "--json").stdout)["attributes"]
             self.assertEqual(attributes["covary:complete"], "true")
 
+    def test_what_an_interruption_left_is_found_before_the_first_frame(self):
+        command = ("-o", "f_#.exr", "--spp", "1", "--denoise", "auto", "--oidn", "off")
+        self.good_render(*command, frames="1-2")
+        (self.path / "f_2.passes").mkdir()
+        (self.path / "f_1.exr").rename(self.path / "f_2.passes" / "independent.exr")
+        result = self.render(*command, frames="1-2")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("'f_2.passes/independent.exr' already exists, in the folder for the films", result.stderr)
+        self.assertFalse((self.path / "f_1.exr").exists())
+
     def test_a_sample_of_a_frame_is_repeated(self):
         self.good_render("-o", "f_#.exr", "--spp", "1", frames="3")
         channels = self.channels("f_3.exr")
