@@ -371,9 +371,9 @@ void for_each_frame(const FrameOptions& o, const FramePatterns& patterns, bool h
                     const std::function<std::string(int frame, std::shared_ptr<const History> history)>& run) {
   if (o.watch) return watch_frames(o, patterns, has_history, run);
   std::vector<int> numbers = frames_of_all(o, patterns);
+  note_gaps(o, numbers, patterns);
   const std::vector<int> left = o.resume ? take_unfinished(numbers, patterns) : std::vector<int>();
   check_frames(numbers, patterns);
-  note_gaps(o, numbers, patterns);
   Frames frames(o, patterns, numbers, has_history, run);
   for (size_t i = 0; i < numbers.size(); ++i)
     frames.add(numbers[i], fmt::format("frame {} ({} of {})", numbers[i], i + 1, numbers.size()));

@@ -37,12 +37,12 @@ TEST(Until, EndsAfterFewSamplesIfTheIntervalIsBelowTheGoal) {
   EXPECT_EQ(render(scene, denoised_plan(), request).until_reached, true) << "there are no more samples to be sure";
 }
 
-TEST(Until, TakesManySamplesIfThereIsNoInterval) {
+TEST(Until, GoesOnIfFewSamplesGiveNoInterval) {
   const LoadedScene scene = load_sized(kRoom, 16, 12);
   ASSERT_FALSE(render(scene, denoised_plan(), request_of(24)).predicted->bounds);
   RenderRequest request = request_of(1000);
   request.until = 1e9;
-  EXPECT_EQ(render(scene, denoised_plan(), request).samples_per_pixel(), 96);
+  EXPECT_GT(render(scene, denoised_plan(), request).samples_per_pixel(), 24);
 }
 
 }  // namespace

@@ -52,10 +52,8 @@ class LongSequence(CliTest):
         result = self.run_covary(*DENOISE, "--resume")
         self.assertEqual(result.returncode, 1)
         self.assertIn("note: 'a.####.exr' has no frames 77\n", result.stderr)
-        for n in self.BAD:
-            self.assertRegex(result.stderr, rf"warning: frame {n} \(\d+ of 239\) failed: a\.{n:04d}\.exr: ")
         self.assertRegex(result.stderr, r"\n\d+ frames in [\d.]+ s; \d+ existed already: ")
-        self.assertIn("2 of 239 frames failed: 40, 160", result.stderr)
+        self.assertIn("2 of 239 frames are incomplete: 40, 160; files of ", result.stderr)
         good = [n for n in frames if n not in self.BAD]
         self.assertEqual(sorted(p.name for p in self.path.glob("o.*.exr")), [f"o.{n:04d}.exr" for n in good])
         for name, time_of in before.items():
