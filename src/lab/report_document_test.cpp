@@ -124,6 +124,8 @@ TEST(ReportTables, ShowTheSamplesThatWereTaken) {
   results.cells[1].equal_sample_normalised = true, results.cells[1].samples_per_pixel = 36;
   EXPECT_TRUE(contains(ratio_table(results, 0)["caption"], "different numbers of samples"));
   EXPECT_EQ(ratio_table(results, 0)["rows"][1]["spp"], 36);
+  results.summaries[0].samples_per_pixel = std::numeric_limits<double>::quiet_NaN();  // no scene has a usable value
+  EXPECT_EQ(error_table(results, 0)["columns"][2]["title"], "iicv");
 }
 
 TEST(ReportTables, PlotsShowPositiveErrorsAndSayWhatTheyShow) {

@@ -45,7 +45,8 @@ std::string method_title(const Results& results, size_t method, size_t budget) {
   const std::string& name = results.suite.methods[method].name;
   const double asked = results.suite.budgets[budget].spp;
   for (const Summary& s : results.summaries)
-    if (s.method == method && s.budget == budget && asked > 0 && s.samples_per_pixel != asked)
+    if (s.method == method && s.budget == budget && asked > 0 && std::isfinite(s.samples_per_pixel) &&
+        s.samples_per_pixel != asked)
       return fmt::format("{} ({:.4g} spp)", name, s.samples_per_pixel);
   return name;
 }
