@@ -86,6 +86,20 @@ Planes noise_of_means(const GroupedImage& crn, const GroupedImage& independent) 
   return noise;
 }
 
+/// Of the CRN and the filtered image the brighter, at each pixel: a pixel that is dark in both is dark, even if its
+/// neighbours are bright.
+Planes brightest_of(const FilterInput& input, const Image& filtered) {
+  Planes brightest(input.width(), input.height(), 1, 0, 0);
+  parallel_for(input.height(), 8, [&](int y) {
+    for (int x = 0; x < input.width(); ++x) {
+      const float* f = filtered.pixel(x, y);
+      const Spectrum d(input.dependent.row(0, y)[x], input.dependent.row(1, y)[x], input.dependent.row(2, y)[x]);
+      brightest.row(0, y)[x] = std::max(colour_length(d), colour_length({f[0], f[1], f[2]})) / 3;
+    }
+  });
+  return brightest;
+}
+
 /// Writes the mixture of least measured error to pixels that have independent samples.
 void mix(const GroupedImage& crn, const GroupedImage& independent, const std::vector<unsigned char>& valid,
          const DependentTestsOptions& options, const DependentFilters& filters, const FilterInput& input,
@@ -97,8 +111,9 @@ void mix(const GroupedImage& crn, const GroupedImage& independent, const std::ve
     narrow.emplace(filters.bound(input, 3, scale));
     candidates.push_back({&narrow->colour, &narrow->centre_weight});
   }
-  const Image mixture =
-      least_error_mixture(input, noise_of_means(crn, independent), valid, candidates, options.measure_window);
+  const Planes brightest = brightest_of(input, filtered.colour);
+  const Image mixture = least_error_mixture(input, noise_of_means(crn, independent), valid, candidates,
+                                            options.measure_window, &brightest);
   for (int y = 0; y < crn.height; ++y)
     for (int x = 0; x < crn.width; ++x)
       if (input.count.row(0, y)[x] > 0) std::copy_n(mixture.pixel(x, y), 3, result.pixel(x, y));

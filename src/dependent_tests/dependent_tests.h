@@ -84,7 +84,7 @@ EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& ind
 int dependent_tests_reach(const DependentTestsOptions& options);
 
 /// Approximate memory of dependent_tests() beyond its input, including its result: bytes per pixel.
-inline constexpr double kDependentTestsBytesPerPixel = 4.0 * (3 + 3 + 2 + 2 + 7 + 4 + 7 + 3 + 6) + 24;
+inline constexpr double kDependentTestsBytesPerPixel = 4.0 * (3 + 3 + 2 + 2 + 7 + 4 + 7 + 3 + 6 + 1) + 24;
 /// Without stages, large images are processed in bands of rows, with the bits of the whole: at most this many bytes
 /// beyond input and result, unless 64 rows and their surroundings need more.
 inline constexpr double kDependentTestsBand = 48e6;

@@ -17,7 +17,7 @@ constexpr float kOffset = 0.01f;      // added to squared brightness, as in relM
 constexpr int kBlock = 32;            // rows processed together
 
 /// 1 / (brightness^2 + 0.01) of each pixel, 0 for pixels left out.
-Planes error_weights(const FilterInput& input, std::vector<unsigned char> used) {
+Planes error_weights(const FilterInput& input, std::vector<unsigned char> used, const Planes* brightest) {
   Planes brightness(input.width(), input.height(), 1, 0, 0);
   parallel_for(input.height(), 8, [&](int y) {
     for (int x = 0; x < input.width(); ++x) {
@@ -29,6 +29,7 @@ Planes error_weights(const FilterInput& input, std::vector<unsigned char> used) 
   parallel_for(input.height(), 8, [&](int y) {
     for (int x = 0; x < input.width(); ++x) {
       float& weight = weights.row(0, y)[x];
+      if (brightest) weight = std::min(weight, brightest->row(0, y)[x]);
       weight = used[static_cast<size_t>(y) * input.width() + x] ? 1 / (weight * weight + kOffset) : 0.0f;
     }
   });
@@ -124,10 +125,10 @@ class Mixer {
 }  // namespace
 
 Image least_error_mixture(const FilterInput& input, const Planes& noise, const std::vector<unsigned char>& valid,
-                          std::span<const MixtureCandidate> candidates, int window) {
+                          std::span<const MixtureCandidate> candidates, int window, const Planes* brightest) {
   COVARY_CHECK(!candidates.empty() && candidates.size() <= kMixtureCandidates, "one to three candidates");
   Image result(input.width(), input.height(), 3);
-  const Planes weights = error_weights(input, valid);
+  const Planes weights = error_weights(input, valid, brightest);
   const Mixer mixer(input, noise, weights, candidates, window);
   parallel_for((input.height() + kBlock - 1) / kBlock, 1, [&](int block) {
     mixer.mix_rows(block * kBlock, std::min(input.height(), (block + 1) * kBlock), result);

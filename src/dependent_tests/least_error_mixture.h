@@ -11,7 +11,8 @@
 //
 // estimated without bias, whatever the errors of X_j: noise, distortion, or errors common to whole regions. It is
 // summed over a window around each pixel, with the weights of relMSE, and minimised over a >= 0, sum a <= 1. As v tends
-// to 0, so do the a_j of images with a remaining error.
+// to 0, so do the a_j of images with a remaining error. Weights have the brightness of C_i, averaged over 7 x 7 pixels;
+// beside a light this is far too much for dark pixels, so that light that leaks into them would hardly count.
 #pragma once
 
 #include <span>
@@ -30,9 +31,10 @@ struct MixtureCandidate {
 inline constexpr int kMixtureCandidates = 3;
 
 /// `noise`: one plane, v of each pixel. Pixels that are invalid or without samples (input.count) are left out of the
-/// sums and keep their C_i. `window`: side of the windows of the sums, odd. Bit-identical for any number of threads.
+/// sums and keep their C_i. `window`: side of the windows of the sums, odd. `brightest`: one plane, for weights the
+/// most that a pixel's brightness can be, or null. Bit-identical for any number of threads.
 Image least_error_mixture(const FilterInput& input, const Planes& noise, const std::vector<unsigned char>& valid,
-                          std::span<const MixtureCandidate> candidates, int window);
+                          std::span<const MixtureCandidate> candidates, int window, const Planes* brightest = nullptr);
 
 /// Radius of influence of input and candidates on a pixel, in rows or columns.
 int least_error_mixture_reach(int window);

@@ -149,6 +149,33 @@ TEST(LeastErrorMixture, CountsThePixelsOwnSamplesOnce) {
   EXPECT_GT(mean_square_error(scene.mix({{&image, nullptr}}, 31)), 0.048) << "too little of its own";
 }
 
+/// Left a noisy light, right dark pixels; the candidate is right on the light and leaks into one column beside it.
+TEST(LeastErrorMixture, LeaksIntoDarkPixelsBesideALightCount) {
+  constexpr int kEdge = 30;
+  constexpr float kLight = 10, kDark = 0.05f, kLeak = 0.5f;
+  Scene scene(1);
+  Image candidate(kWidth, kHeight, 3);
+  Planes brightest(kWidth, kHeight, 1, 0, 0);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) {
+      const bool lit = x < kEdge;
+      for (int c = 0; c < 3; ++c) {
+        scene.input.independent.row(c, y)[x] = lit ? kLight + Scene::random(1, x, y, c, 1) : kDark;
+        candidate.pixel(x, y)[c] = lit ? kLight : x == kEdge ? kLeak : kDark;
+      }
+      if (!lit) scene.noise.row(0, y)[x] = 0;
+      brightest.row(0, y)[x] = lit ? kLight : x == kEdge ? kLeak : kDark;
+    }
+  const std::vector<MixtureCandidate> candidates = {{&candidate, nullptr}};
+  const auto dark = [&](const Planes* limit) {
+    return least_error_mixture(scene.input, scene.noise, scene.valid, candidates, 7, limit).pixel(kEdge, 25)[1];
+  };
+  EXPECT_GT(dark(nullptr), 0.45f) << "the dark pixels count as bright ones";
+  // Three columns of a light of variance 1, and one of a leak: the candidate's weight, a = b / A.
+  const double lit = 3 / (kLight * kLight + 0.01), leak = std::pow(kLeak - kDark, 2) / (kLeak * kLeak + 0.01);
+  EXPECT_NEAR(dark(&brightest), kDark + (kLeak - kDark) * lit / (lit + leak), 0.03);
+}
+
 TEST(LeastErrorMixture, WithoutNoiseOrDifferenceItIsTheImageItself) {
   Scene silent(0.3);
   for (int y = 0; y < kHeight; ++y) std::fill_n(silent.noise.row(0, y), kWidth, 0.0f);
