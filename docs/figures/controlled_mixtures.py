@@ -1,21 +1,23 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """controlled_mixtures.py OUT.jpg: the first picture of docs/methods/controlled-mixture-sampling.md. Needs
-`pip install numpy matplotlib pillow`.
+`pip install numpy matplotlib pillow`. controlled_mixtures.py weights: a table of other weights of the mixtures; needs
+numpy.
 
 The demonstrations of Hua et al. 2023, Sec. 5, in one dimension: one sample from a mixture of densities, without and
 with the control variate made of these densities. Above: the integrand, and the densities times their probabilities.
-Below: the estimate from one sample at x, without control (f/p) and with it. Where it is constant, there is no noise."""
+Below: the estimate from one sample at x, without control (f/p) and with it. Where it is constant, there is no noise.
+
+The table has variances with control: with the given weights, with those that are best without control, and with those
+chosen jointly with it [He and Owen 2014], in steps of 1/20."""
+import itertools
 import sys
 
-import matplotlib
 import numpy as np
-
-matplotlib.use("Agg")
-from matplotlib import pyplot  # noqa: E402
 
 N = 400
 X = (np.arange(N) + 0.5) / N
+STEPS = 20  # weights are multiples of 1 / STEPS
 COLOURS = ["#1098ad", "#d6336c", "#e6a700"]
 
 
@@ -50,7 +52,30 @@ def variance(values, p):
     return ((values - mean) ** 2 * p).mean()
 
 
-def main(out):
+def variances(integrands, counts, densities):
+    """Without and with control, summed over the integrands."""
+    p = counts @ densities
+    return (sum(variance(f / p, p) for f in integrands),
+            sum(variance(controlled(f, counts, densities), p) for f in integrands))
+
+
+def choices_of_weights():
+    """Title -> variances with control of the given weights, of the best without control, and of the best with it."""
+    rows = {}
+    for title, integrands, components in problems():
+        given = np.array([count for count, _ in components])
+        densities = np.array([shape / shape.mean() for _, shape in components])
+        choices = [np.array(parts) / STEPS for parts in itertools.product(range(1, STEPS), repeat=len(given))
+                   if sum(parts) == STEPS]
+        found = [variances(integrands, counts, densities) for counts in choices]
+        rows[title] = (variances(integrands, given, densities)[1], min(found)[1], min(after for _, after in found))
+    return rows
+
+
+def draw(out):
+    import matplotlib
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
     figure, axes = pyplot.subplots(2, 4, figsize=(13, 5), height_ratios=[1, 1.2], sharex=True)
     for (title, integrands, components), (above, below) in zip(problems(), axes.T):
         counts = np.array([count for count, _ in components])
@@ -73,6 +98,13 @@ def main(out):
     axes[1, 0].legend(fontsize=8, frameon=False)
     figure.tight_layout()
     figure.savefig(out, dpi=75)
+
+
+def main(out):
+    if out != "weights":
+        return draw(out)
+    for title, values in choices_of_weights().items():
+        print(f"{title}:", ", ".join(f"{value:.3g}" if value > 1e-9 else "0" for value in values))
 
 
 if __name__ == "__main__":

@@ -70,9 +70,9 @@ def pilot_error(crn, h):
     return (pilot - h) ** 2
 
 
-def estimate(crn, h, error_of_h, guide=None):
-    """Eq. (7) with the coefficients of Eq. (10), shared by the channels, and the symmetric penalty. `guide`: the image
-    whose nearest values become control variates; default: the CRN image."""
+def coefficients(crn, error_of_h, guide=None):
+    """Those of Eq. (10), [y][x][i], shared by the channels, with the symmetric penalty, and rows and columns of the
+    pixels they belong to. `guide`: the image whose nearest values become control variates; default: the CRN image."""
     n_groups = len(crn)
     g = crn.mean(0)
     guide = g if guide is None else guide
@@ -84,15 +84,21 @@ def estimate(crn, h, error_of_h, guide=None):
     own = n_groups * error_of_h.sum(-1)
     penalty = np.maximum(0.5 * (own[..., None] + own[y, x]),
                          SMALLEST_PENALTY * crn.var(0, ddof=1).sum(-1)[y, x]) + 1e-30
-    result = np.empty_like(g)
+    beta = np.empty(y.shape)
     for row in range(height):  # the groups' contrasts of one row at a time
         contrasts = (crn[:, y[row], x[row]] - g[y[row], x[row]]).transpose(1, 0, 3, 2).reshape(width, -1, K)
         target = (crn[:, row] - g[row]).transpose(1, 0, 2).reshape(width, -1, 1)
         gram = contrasts.transpose(0, 2, 1) @ contrasts / (n_groups - 1)
         gram[:, np.arange(K), np.arange(K)] += penalty[row]
-        beta = np.linalg.solve(gram, contrasts.transpose(0, 2, 1) @ target / (n_groups - 1))[..., 0]
-        result[row] = g[row] - np.einsum("xi,xic->xc", beta, g[y[row], x[row]] - h[y[row], x[row]])
-    return result
+        beta[row] = np.linalg.solve(gram, contrasts.transpose(0, 2, 1) @ target / (n_groups - 1))[..., 0]
+    return beta, y, x
+
+
+def estimate(crn, h, error_of_h, guide=None):
+    """Eq. (7) with these coefficients."""
+    beta, y, x = coefficients(crn, error_of_h, guide)
+    g = crn.mean(0)
+    return g - np.einsum("yxi,yxic->yxc", beta, g[y, x] - h[y, x])
 
 
 def rel_mse(image, references):
@@ -100,18 +106,29 @@ def rel_mse(image, references):
     return float(((image - references[0]) * (image - references[1]) / (grey ** 2 + 0.01)).mean())
 
 
+def run(options, *words):
+    subprocess.run([options.covary, *map(str, words), "--quiet", "--overwrite"], check=True)
+
+
+def references_of(options, folder):
+    """Two halves."""
+    halves = [folder / f"reference{half}.exr" for half in (0, 1)]
+    for half, path in enumerate(halves):
+        run(options, "render", options.scene, "--rfilter", "box", "--estimator", "none", "--spp", options.reference_spp,
+            "--seed", 900000001 + half, *options.view, "-o", path)
+    return np.stack([colours(channels_of(path)) for path in halves])
+
+
 def images_of(options, folder, references, seed):
     """By name: path tracing, the program's estimates, and those made here."""
-    def run(*words):
-        subprocess.run([options.covary, *map(str, words), "--quiet", "--overwrite"], check=True)
     passes = ("--crn", folder / "films/crn.exr", "--independent", folder / "films/independent.exr")
     view = (options.scene, "--rfilter", "box", "--spp", options.spp, "--seed", seed, *options.view)
-    run("render", *view, "--estimator", "none", "-o", folder / "pt.exr")
-    run("render", *view, "--estimator", "iicv", "--paper", "--groups", 12, "--passes", folder / "films", "-o",
+    run(options, "render", *view, "--estimator", "none", "-o", folder / "pt.exr")
+    run(options, "render", *view, "--estimator", "iicv", "--paper", "--groups", 12, "--passes", folder / "films", "-o",
         folder / "image.exr")
     images = {"path tracing": colours(channels_of(folder / "pt.exr"))}
     for name, words in PROGRAM.items():
-        run("combine", *passes, "--estimator", *words, "-o", folder / "image.exr")
+        run(options, "combine", *passes, "--estimator", *words, "-o", folder / "image.exr")
         images[name] = colours(channels_of(folder / "image.exr"))
     crn, h = read_groups(folder / "films/crn.exr"), read_groups(folder / "films/independent.exr").mean(0)
     error = pilot_error(crn, h)
@@ -125,11 +142,7 @@ def images_of(options, folder, references, seed):
 def main(options):
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        for half in (0, 1):
-            subprocess.run([options.covary, "render", options.scene, "--rfilter", "box", "--estimator", "none", "--spp",
-                            str(options.reference_spp), "--seed", str(900000001 + half), *options.view, "--quiet", "-o",
-                            folder / f"reference{half}.exr"], check=True)
-        references = np.stack([colours(channels_of(folder / f"reference{half}.exr")) for half in (0, 1)])
+        references = references_of(options, folder)
         errors = {}
         for seed in range(1, options.seeds + 1):
             for name, image in images_of(options, folder, references, seed).items():
@@ -139,8 +152,8 @@ def main(options):
             print(f"{name}: relMSE {error:.5g}, gain {means['path tracing'] / error:.2f}")
 
 
-def arguments():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def arguments(description):
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("covary")
     parser.add_argument("scene")
     parser.add_argument("--spp", type=int, default=192)
@@ -155,4 +168,4 @@ def arguments():
 
 
 if __name__ == "__main__":
-    main(arguments())
+    main(arguments(__doc__))
