@@ -26,6 +26,7 @@
 #include "method_options.h"
 #include "plans/made_file.h"
 #include "plans/made_of.h"
+#include "plans/pass_files.h"
 #include "plans/render.h"
 #include "plans/result_files.h"
 #include "progress.h"
@@ -201,6 +202,9 @@ namespace {
 /// Whether --resume finds a picture that has the wanted error already; says so.
 bool is_there(const RenderOptions& options, const RenderRequest& request) {
   if (!request.resume || !request.passes.empty() || !options.json.empty() || !options.stages.empty()) return false;
+  std::error_code ignored;
+  const std::filesystem::path films = passes_folder(request);
+  if (std::filesystem::exists(films, ignored)) return false;  // of a later render that was interrupted
   const MadeFile file = made_file(request.output);
   if (!reaches(file, request.attributes.at(film_key::kMadeOf), relmse_goal(request))) return false;
   if (!options.quiet)

@@ -224,7 +224,7 @@ TEST(Failure, OutputsThatCannotBeWrittenAreToldBeforeAnyWork) {
   const TemporaryFolder folder;
   write_text_file(folder.file("file"), "text");
   const std::vector<std::tuple<std::string, ErrorCode, std::string>> cases{
-      {"missing/a.exr", ErrorCode::kIo, "no such folder " + folder.file("missing")},
+      {"missing/at/a.exr", ErrorCode::kIo, "no such folder " + folder.file("missing/at")},
       {"file/a.exr", ErrorCode::kIo, "no such folder " + folder.file("file")},
       {"a.png", ErrorCode::kUsage,
        "`output` '" + folder.file("a.png") + "': the name must end in .exr; 'covary convert"},
