@@ -18,6 +18,7 @@
 #include "denoising/candidates.h"
 #include "denoising/denoising_parts.h"
 #include "denoising/mixed_denoising.h"
+#include "denoising/weighed_candidate.h"
 #include "gpu/control_variates.h"
 #include "gpu/iduw.h"
 #include "gpu/mixed_denoising.h"
@@ -79,9 +80,10 @@ Measured measured(const std::string& name, const Options& options, OnDevice on_d
 EstimatorResult denoised(device::Device* device, const Images& in, const gpu::Trial& trial) {
   const GroupedImage independent = in.view(in.independent);
   const Guides guides{&in.albedo, &in.normal};
-  const FilterKinds kinds = kinds_for(kGroups, false);
+  const FilterKinds kinds = kinds_of_mean(false);
   if (device) return gpu::mix_mean(*device, {independent, guides, kinds, {1, 1, false}, {}, true, false}, trial).result;
-  const std::vector<CandidateMaker> makers = {filtered_candidates(guides, CandidateBase::kMean, kinds)};
+  std::vector<CandidateMaker> makers = {filtered_candidates(guides, CandidateBase::kMean, kinds)};
+  add_weighing_maker(guides, makers);
   return denoise_by_mixture(parts_of_mean(independent), makers, DenoiseMode::kAuto, true).result;
 }
 
