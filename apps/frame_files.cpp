@@ -292,8 +292,7 @@ class Frames {
       problems.push_back(fmt::format("{} of {} frames failed: {}", failed_.size(), n_all, text_of(failed_)));
     if (!left.empty())
       problems.push_back(fmt::format("{} of {} frames are incomplete: {}; files of '{}' are missing or unfinished",
-                                     left.size(), n_all, text_of(left),
-                                     fmt::join(read_patterns(patterns_), "', '")));
+                                     left.size(), n_all, text_of(left), fmt::join(read_patterns(patterns_), "', '")));
     if (!problems.empty()) throw Error(ErrorCode::kInput, fmt::format("{}", fmt::join(problems, "; ")));
   }
 

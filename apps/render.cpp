@@ -208,8 +208,9 @@ bool is_there(const RenderOptions& options, const RenderRequest& request) {
   const MadeFile file = made_file(request.output);
   if (!reaches(file, request.attributes.at(film_key::kMadeOf), relmse_goal(request))) return false;
   if (!options.quiet)
-    fmt::print(stderr, "{}: complete, with a predicted relMSE of {:.3g}; nothing to render (--overwrite instead of "
-                       "--resume renders it again)\n",
+    fmt::print(stderr,
+               "{}: complete, with a predicted relMSE of {:.3g}; nothing to render (--overwrite instead of "
+               "--resume renders it again)\n",
                request.output, *file.predicted);
   return true;
 }

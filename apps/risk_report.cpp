@@ -63,8 +63,7 @@ void print_notes(const DenoisingChoice& choice, const std::string& note) {
 
 void print_risks(const CombinedImage& combined, const DenoisingChoice& choice) {
   print_notes(choice, combined.image.note);
-  if (combined.predicted)
-    fmt::print(stderr, "{}\n", prediction_text(*combined.predicted, combined.image.risks));
+  if (combined.predicted) fmt::print(stderr, "{}\n", prediction_text(*combined.predicted, combined.image.risks));
 }
 
 void add_risks(const std::optional<MeasuredRisks>& risks, nlohmann::ordered_json& json) {

@@ -38,14 +38,19 @@ std::string relative_name(const fs::path& file, const fs::path& folder) {
 
 /// A parameter that Mitsuba's plugin of the same name lacks; empty if there is none.
 std::string own_parameter(const ObjectDescription& object) {
-  static constexpr std::pair<const char*, const char*> kOwn[] = {
-      {"spot", "falloff"},           {"hdrfilm", "response"},
-      {"bitmap", "gamma"},           {"checkerboard", "dimension"},
-      {"area", "two_sided"},         {"area", "power"},
-      {"area", "hidden"},
-      {"scale", "exponent"},         {"projector", "constant_intensity"},
-      {"roughplastic", "alpha_u"},   {"homogeneous", "radiance"},
-      {"heterogeneous", "radiance"}, {"normalmap", "along_dv"}};
+  static constexpr std::pair<const char*, const char*> kOwn[] = {{"spot", "falloff"},
+                                                                 {"hdrfilm", "response"},
+                                                                 {"bitmap", "gamma"},
+                                                                 {"checkerboard", "dimension"},
+                                                                 {"area", "two_sided"},
+                                                                 {"area", "power"},
+                                                                 {"area", "hidden"},
+                                                                 {"scale", "exponent"},
+                                                                 {"projector", "constant_intensity"},
+                                                                 {"roughplastic", "alpha_u"},
+                                                                 {"homogeneous", "radiance"},
+                                                                 {"heterogeneous", "radiance"},
+                                                                 {"normalmap", "along_dv"}};
   const auto has = [&](const std::string& name) {
     return std::any_of(object.properties.begin(), object.properties.end(),
                        [&](const Property& p) { return p.name == name; });

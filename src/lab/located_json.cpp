@@ -78,10 +78,10 @@ class Builder : public nlohmann::json_sax<Json> {
     const size_t before = at == 0 ? std::string::npos : text_.find_last_not_of(" \t\r\n", at - 1);
     const bool is_comma = before != std::string::npos && text_[before] == ',' && at < text_.size() &&
                           (text_[at] == ']' || text_[at] == '}');
-    throw Error(ErrorCode::kInput,
-                fmt::format("{}:{}:{}: not JSON: {}{}; the line is '{}'", document_.name, number, at - first + 1,
-                            is_comma ? "no comma may stand before the end of a list or object; " : "", what,
-                            printable(line)));
+    throw Error(
+        ErrorCode::kInput,
+        fmt::format("{}:{}:{}: not JSON: {}{}; the line is '{}'", document_.name, number, at - first + 1,
+                    is_comma ? "no comma may stand before the end of a list or object; " : "", what, printable(line)));
   }
 
  private:

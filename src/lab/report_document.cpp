@@ -233,9 +233,10 @@ std::string verdict(const Results& results, size_t budget, const std::string& co
                        suite.baseline, suite.methods[best->method].name, 1 / gain.value);
   const std::string range = fmt::format("({} to {})", factor_text(gain.low), factor_text(gain.high));
   if (gain.low <= 1)
-    return fmt::format("{} no method has clearly less error than '{}': that of '{}' is {} times lower {}, which these "
-                       "seeds and scenes do not tell from 1.",
-                       condition, suite.baseline, suite.methods[best->method].name, factor_text(gain.value), range);
+    return fmt::format(
+        "{} no method has clearly less error than '{}': that of '{}' is {} times lower {}, which these "
+        "seeds and scenes do not tell from 1.",
+        condition, suite.baseline, suite.methods[best->method].name, factor_text(gain.value), range);
   std::string text = fmt::format("{} '{}' has the lowest error: {} times lower than '{}'", condition,
                                  suite.methods[best->method].name, factor_text(gain.value), suite.baseline);
   if (!std::isfinite(gain.low)) return text + ".";

@@ -125,8 +125,7 @@ TEST(Suite, CommonOptionsHaveNoEstimator) {
 }
 
 TEST(Suite, ReportsWhatIsNotJson) {
-  EXPECT_TRUE(contains(message_of([] { parse_suite("{\n  \"name\": \"x\",\n  oops\n}", "bad.json"); }),
-                       "bad.json:3:"));
+  EXPECT_TRUE(contains(message_of([] { parse_suite("{\n  \"name\": \"x\",\n  oops\n}", "bad.json"); }), "bad.json:3:"));
   EXPECT_TRUE(contains(message_of([] { parse_suite("{\"name\": 1,\n\"name\": 2}", "bad.json"); }),
                        "bad.json:2: the key 'name' appears twice"));
   EXPECT_TRUE(contains(message_of([] { parse_suite("[]", "bad.json"); }), "bad.json:1: expected an object"));
