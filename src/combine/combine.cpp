@@ -166,7 +166,8 @@ int rows_in_memory(const CombineRequest& request) {
 double planned_memory(const CombineRequest& request) {
   const int height = request.independent.height, reach = request.estimator.reach;
   // Bands of a mixture begin at even multiples of kRegressionCell, and have as many rows.
-  const int fewest = needs_whole(request) ? height : std::min(height, kFewestRows + 3 * kRegressionCell + 2 * reach);
+  const int cells = (request.estimator.image_in_rows ? 3 : 1) * kRegressionCell;
+  const int fewest = needs_whole(request) ? height : std::min(height, kFewestRows + cells + 2 * reach);
   const int rows = std::max(fewest, rows_in_memory(request));
   const double of_rows = memory_of_rows(request, rows);
   if (request.estimator.network.empty() || rows >= height) return of_rows;

@@ -64,8 +64,8 @@ class CtrlC(PackageTest):
         """Eight processes of three interruptions each."""
         denoiser = os.environ["STAND_IN_DENOISER"]
         for seed in range(SEED, SEED + self.processes):
-            run = subprocess.run([sys.executable, "-c", WORK, ROOM, denoiser, str(seed), "3"], capture_output=True,
-                                 text=True, timeout=300, check=False,
+            words = ["-W", "ignore::UserWarning", "-c", WORK, ROOM, denoiser, str(seed), "3"]
+            run = subprocess.run([sys.executable, *words], capture_output=True, text=True, timeout=300, check=False,
                                  preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler))
             self.assertEqual((run.returncode, run.stdout, run.stderr), (0, "as before\n", ""), f"seed {seed}")
 
