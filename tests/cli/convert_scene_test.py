@@ -64,7 +64,7 @@ class ConvertScene(CliTest):
         self.bad(2, "the output 'out.txt': the name must end in .xml", "convert-scene", "mesh.pbrt", "out.txt")
         self.bad(2, "the output 'mesh.pbrt'", "convert-scene", "mesh.pbrt", "mesh.pbrt")
         self.bad(2, "is a file that the same command reads", "convert-scene", "old.xml", "old.xml", "--overwrite")
-        self.bad(1, "no-folder", "convert-scene", "mesh.pbrt", "no-folder/out.xml")
+        self.bad(1, "no-folder", "convert-scene", "mesh.pbrt", "no-folder/at/out.xml")
         self.bad(1, "no.pbrt", "convert-scene", "no.pbrt", "out.xml")
         self.bad(2, "must be the name of a file", "convert-scene", "mesh.pbrt", "/dev/null")
         self.bad(2, "scenes of pbrt have no parameters to define", "convert-scene", "mesh.pbrt", "out.xml", "-D", "a=1")

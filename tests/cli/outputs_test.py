@@ -394,7 +394,8 @@ class Numbers(OutputsTest):
         self.bad(2, "--set penalty: 'foo': expected pilot, sample, asymmetric; see", *combine,
                  "--set", "penalty=foo")
         self.bad(2, "--set penalty: '3': expected pilot", *combine, "--set", "penalty=3")
-        self.bad(2, "--set penalty: 'sampel'; did you mean 'sample'", *combine, "--set", "penalty=sampel")
+        self.bad(2, "'sampel': expected pilot, sample, asymmetric; did you mean 'sample'?", *combine,
+                 "--set", "penalty=sampel")
         self.bad(2, "--estimator: 'none': expected mixture, iicv, cv-baseline, iduw", *combine, "--estimator", "none")
 
     def test_a_window_beyond_all_bounds(self):
