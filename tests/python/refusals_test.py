@@ -20,7 +20,7 @@ class Refusals(PackageTest):
     def test_outputs_are_checked_first(self):
         """Before the scene is read, in the program's words; nothing is written."""
         (self.path / "file").touch()
-        for name, error, message in (("missing/a.exr", covary.IoError, f"no such folder {self.path / 'missing'}"),
+        for name, error, message in (("missing/at/a.exr", covary.IoError, f"no such folder {self.path / 'missing'}"),
                                      ("file/a.exr", covary.IoError, f"no such folder {self.path / 'file'}"),
                                      ("a.png", covary.UsageError, "output 'a.png': the name must end in .exr"),
                                      ("a", covary.UsageError, "the name must end in .exr")):
@@ -92,7 +92,7 @@ class Refusals(PackageTest):
             return covary.render_frames(**{"scene": "room", "output": self.path / "a_#.exr", "frames": "1", "spp": 1,
                                            "resolution": (8, 8), **arguments})
 
-        self.assertIn("no such folder", self.message_of(covary.IoError, frames, output=self.path / "no" / "a_#.exr"))
+        self.assertIn("no such folder", self.message_of(covary.IoError, frames, output=self.path / "no/at/a_#.exr"))
         self.assertIn("path.json", self.message_of(covary.IoError, frames, camera_path=self.path / "path.json"))
         frames()
         self.assertIn("overwrite=True", self.message_of(covary.InputError, frames, spp=2, resume=True))
