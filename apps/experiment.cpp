@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "declared_options.h"
 #include "experiment_run.h"
+#include "film/output_folder.h"
 #include "io/scene_formats.h"
 #include "json_output.h"
 #include "lab/suite.h"
@@ -171,7 +172,7 @@ void experiment(ExperimentCommand command) {
   if (command.print) return write_text_output("-", json_text(lab::to_json(suite)));
   if (command.output.empty()) throw Error(ErrorCode::kUsage, "no folder for the results given; use -o DIR");
   check_methods(suite, programs);
-  make_folder(command.output);
+  make_output_folder(command.output);
   const std::string scenes =
       command.scenes.empty() ? lab::scenes_folder(suite, command.suite, program_path()) : command.scenes;
   check_files(command, suite, scenes, command.output);

@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "experiment_run.h"
 #include "film/output_file.h"
+#include "film/output_folder.h"
 #include "film/outputs.h"
 #include "json_output.h"
 #include "lab/time_estimate.h"
@@ -95,12 +96,12 @@ void experiment_paper(const ExperimentCommand& command, const lab::Paper& paper)
       lab::prepare_parts(paper, command.only, command.scenes, own_folder, command.overrides);
   if (command.print) return print_suites(parts);
   if (command.output.empty()) throw Error(ErrorCode::kUsage, "no folder for the results given; use -o DIR");
-  make_folder(command.output);
+  make_output_folder(command.output);
   std::vector<lab::ExperimentOptions> options;
   for (const lab::PreparedPart& part : parts) {
     check_methods(part.suite, {});
     const std::string folder = command.output + "/" + part.part.names[0];
-    make_folder(folder);
+    make_output_folder(folder);
     check_files(command, part.suite, own_folder, folder);
     options.push_back(run_options(command, own_folder, {}));
     options.back().max_pixels = lab::most_pixels(overrides_of(command, part));

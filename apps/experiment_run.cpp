@@ -6,15 +6,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <chrono>
-#include <condition_variable>
 #include <filesystem>
 #include <fstream>
-#include <mutex>
 #include <sstream>
-#include <stop_token>
-#include <thread>
-#include <utility>
 
 #include "combine/registry.h"
 #include "commands.h"
@@ -57,43 +51,21 @@ RenderOptions parsed(std::vector<std::string> words, bool of_frames) {
 }
 
 /// The experiment's progress, on a separate line, with the time left while a run takes long; failures stay above it.
-class SuiteProgress {
- public:
-  SuiteProgress(std::string name, bool quiet) : name_(std::move(name)), line_("", quiet) {}
-  void take(const lab::Progress& p) {
-    const std::lock_guard lock(mutex_);
-    if (p.kind == lab::Progress::Kind::kFailed) {
-      line_.clear();
-      fmt::print(stderr, "failed: {}{}\n", name_, p.what);
-      return;
-    }
-    now_ = p, since_ = Stopwatch();
-    show();
+void show_progress(const lab::Progress& p, const std::string& name, ProgressLine& line) {
+  if (p.kind == lab::Progress::Kind::kFailed) {
+    line.clear();
+    fmt::print(stderr, "failed: {}{}\n", name, p.what);
+    return;
   }
-
- private:
-  void show() {
-    const double left = now_.seconds_left - since_.seconds();
-    line_.show(fmt::format("[{}/{}{}] {}{}", now_.done, now_.total,
-                           left > 0                ? ", " + format_duration(left) + " left"
-                           : now_.seconds_left > 0 ? ", longer than expected"
-                                                   : "",
-                           name_, now_.what));
-  }
-  void show_regularly(const std::stop_token& stop) {
-    std::unique_lock lock(mutex_);
-    while (!end_.wait_for(lock, stop, std::chrono::seconds(1), [&] { return stop.stop_requested(); }))
-      if (now_.total > 0) show();
-  }
-
-  const std::string name_;
-  ProgressLine line_;
-  std::mutex mutex_;  // of all below, and of the line
-  lab::Progress now_;
-  Stopwatch since_;
-  std::condition_variable_any end_;
-  std::jthread showing_{[this](const std::stop_token& stop) { show_regularly(stop); }};  // ends before the others
-};
+  line.show([p, name, since = Stopwatch()] {
+    const double left = p.seconds_left - since.seconds();
+    return fmt::format("[{}/{}{}] {}{}", p.done, p.total,
+                       left > 0             ? ", " + format_duration(left) + " left"
+                       : p.seconds_left > 0 ? ", longer than expected"
+                                            : "",
+                       name, p.what);
+  });
+}
 
 lab::PlanContext plan_context(const lab::Programs& programs) {
   return {program_version(),
@@ -121,8 +93,6 @@ std::string read_file(const std::string& path) {
   text << file.rdbuf();
   return text.str();
 }
-
-void make_folder(const std::string& folder) { make_output_folder(folder); }
 
 void check_files(const ExperimentCommand& command, const lab::Suite& suite, const std::string& scenes,
                  const std::string& folder) {
@@ -183,10 +153,10 @@ lab::ExperimentOptions run_options(const ExperimentCommand& command, const std::
 }
 
 lab::Results run_suite(const lab::Suite& suite, lab::ExperimentOptions options, const std::string& name, bool quiet) {
-  SuiteProgress progress(name, quiet);
+  ProgressLine progress("", quiet);
   const StopFlag stop;
   options.stop = stop.token();
-  options.progress = [&](const lab::Progress& p) { progress.take(p); };
+  options.progress = [&](const lab::Progress& p) { show_progress(p, name, progress); };
   return lab::run_experiment(suite, options);
 }
 

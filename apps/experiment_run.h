@@ -33,7 +33,6 @@ constexpr const char *kResults = "/results.json", *kTable = "/results.csv", *kRe
 std::string read_file(const std::string& path);
 
 /// Makes the folder of the results. Throws Error.
-void make_folder(const std::string& folder);
 
 /// Before the experiment begins: results in `folder` must not overwrite anything that it reads, or unrelated files.
 void check_files(const ExperimentCommand& command, const lab::Suite& suite, const std::string& scenes,

@@ -72,13 +72,13 @@ ProgressLine::~ProgressLine() { finish(); }
 
 void ProgressLine::begin(const std::string& phase, uint64_t done) {
   const std::lock_guard lock(mutex_);
-  phase_ = phase, shown_.clear();
+  phase_ = phase, shown_ = nullptr;
   first_ = done_ = done, total_ = 0;
   expected_ = nullptr, later_units_ = later_seconds_ = 0;
   of_phase_ = Stopwatch();
   if (quiet_) return;
   if (terminal_) draw();
-  if (!redrawing_.joinable()) redrawing_ = std::thread([this] { redraw_regularly(); });
+  start_redrawing();
 }
 
 std::string ProgressLine::phase() const {
@@ -137,10 +137,11 @@ std::string ProgressLine::note() const {
   return fmt::format("  relMSE {}{}", reached_, goal_ > 0 ? fmt::format(", goal {:.2g}", goal_) : "");
 }
 
-void ProgressLine::show(const std::string& text) {
+void ProgressLine::show(std::function<std::string()> text) {
   const std::lock_guard lock(mutex_);
-  shown_ = text;
+  shown_ = std::move(text);
   if (terminal_ || !drawn_ || of_line_.seconds() >= next_) draw();
+  if (!quiet_) start_redrawing();
 }
 
 double ProgressLine::all_left(double seconds) const {
@@ -168,7 +169,7 @@ std::string ProgressLine::bar_text(int columns) const {
 }
 
 std::string ProgressLine::text(int columns) const {
-  if (!shown_.empty()) return shown_;
+  if (shown_) return shown_();
   if (done_ > first_ && (total_ > 0 || seconds_limit_ > 0)) return bar_text(columns);
   const double seconds = of_phase_.seconds();
   std::string text = fmt::format("{}: {}", label_, phase_);
@@ -182,7 +183,7 @@ void ProgressLine::draw() {
   if (quiet_ || finished_) return;
   const double now = of_line_.seconds();
   next_ = terminal_ || file_of_caller() ? now + kTerminalSeconds : std::max(now + kLogSeconds, now * kLogGrowth);
-  if (!shown_.empty()) next_ = std::min(next_, now + kShownSeconds);
+  if (shown_) next_ = std::min(next_, now + kShownSeconds);
   const int columns = terminal_ ? terminal_columns() - 1 : 1000;  // the last column would wrap the line
   const std::string line = cut_to(text(terminal_ ? columns : kUsualColumns + kBarColumns), columns);
   drawn_ = true;
@@ -191,10 +192,14 @@ void ProgressLine::draw() {
   std::fflush(stderr);
 }
 
+void ProgressLine::start_redrawing() {
+  if (!redrawing_.joinable()) redrawing_ = std::thread([this] { redraw_regularly(); });
+}
+
 void ProgressLine::redraw_regularly() {
   std::unique_lock lock(mutex_);
   while (!end_.wait_for(lock, std::chrono::milliseconds(500), [this] { return finished_; }))
-    if (!phase_.empty() && shown_.empty() && of_line_.seconds() >= next_) draw();
+    if ((!phase_.empty() || shown_) && of_line_.seconds() >= next_) draw();
 }
 
 void ProgressLine::erase() {

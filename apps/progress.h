@@ -44,8 +44,8 @@ class ProgressLine {
   /// The error so far, shown with its bounds. With a goal, the total is at least the estimated number of samples for
   /// it, as errors fall like 1 / samples.
   void toward(const PredictedError& reached);
-  /// Shows this text instead.
-  void show(const std::string& text);
+  /// Shows this text instead, asked for whenever the line is drawn.
+  void show(std::function<std::string()> text);
   /// Clears the line (terminal) before other output.
   void clear();
   /// Clears it for good.
@@ -59,12 +59,14 @@ class ProgressLine {
   std::string note() const;
   void draw();
   void erase();
+  void start_redrawing();
   void redraw_regularly();
 
   const std::string label_;
   const bool quiet_, terminal_;
   mutable std::mutex mutex_;  // of all below
-  std::string phase_, shown_, reached_;
+  std::string phase_, reached_;
+  std::function<std::string()> shown_;
   uint64_t done_ = 0, total_ = 0, least_total_ = 0;
   uint64_t first_ = 0;  // done_ when the phase began
   bool drawn_ = false, finished_ = false;
@@ -76,7 +78,7 @@ class ProgressLine {
   double repeat_seconds_ = 0;
   double next_;  // when to draw, seconds of the line
   std::condition_variable end_;
-  std::thread redrawing_;  // shows the seconds of phases without progress
+  std::thread redrawing_;  // shows the seconds of phases without progress, and texts that change
 };
 
 /// 75 -> "1:15", 4000 -> "1:06:40".
