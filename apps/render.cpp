@@ -24,7 +24,6 @@
 #include "json_output.h"
 #include "live.h"
 #include "method_options.h"
-#include "plans/made_file.h"
 #include "plans/made_of.h"
 #include "plans/pass_files.h"
 #include "plans/render.h"

@@ -7,7 +7,6 @@
 
 #include "core/processor_time.h"
 #include "plans/budget.h"
-#include "plans/first_check.h"
 
 namespace covary {
 namespace {

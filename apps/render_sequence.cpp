@@ -20,7 +20,6 @@
 #include "passes/motion.h"
 #include "plans/budget.h"
 #include "plans/camera_path.h"
-#include "plans/made_file.h"
 #include "plans/made_of.h"
 #include "plans/pass_files.h"
 #include "sequences/feature_slopes.h"

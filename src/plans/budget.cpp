@@ -73,6 +73,15 @@ uint32_t first_budget(const LoadedScene& scene, const RenderRequest& request) {
   return request.until > 0 ? std::min(largest, kFirstBudget) : largest;
 }
 
+double relmse_goal(const RenderRequest& request) { return request.until_in_blocks ? 0 : request.until; }
+
+uint32_t samples_before_check(const LoadedScene& scene, const Plan& plan, const RenderRequest& request) {
+  constexpr uint32_t kOfMeans = 24;
+  const bool is_mean = plan.phases.size() == 1 && !plan.method->pair() && !plan.has_crn_pass;
+  const uint32_t usual = first_budget(scene, request);
+  return request.until > 0 && is_mean ? std::min(usual, kOfMeans) : usual;
+}
+
 std::vector<uint32_t> samples_of_passes(const Shares& shares, uint32_t budget) {
   return split_samples(budget, shares.parts, shares.fewest);
 }

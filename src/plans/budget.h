@@ -30,8 +30,11 @@ CropWindow window_of(const LoadedScene& scene, const RenderRequest& request);
 
 /// Maximum samples per pixel of all passes together.
 uint32_t largest_budget(const LoadedScene& scene, const RenderRequest& request);
-/// Samples per pixel before the error is checked for the first time.
+/// Samples per pixel from which on a predicted error is taken as it is; without a target, as many as there may be.
 uint32_t first_budget(const LoadedScene& scene, const RenderRequest& request);
+/// Samples per pixel, of all passes together, before the error is checked for the first time: fewer for means, denoised
+/// or not, two for each of twelve groups.
+uint32_t samples_before_check(const LoadedScene& scene, const Plan& plan, const RenderRequest& request);
 
 /// Default number of groups of each pass that the estimator reads: choose_groups() of film/groups.h for the state's
 /// group_budget. With a time limit, when the number of samples is only roughly known, divisors do not help: 12, or
@@ -74,5 +77,8 @@ class ErrorRounds {
   std::vector<uint32_t> budgets_;
   size_t now_ = 0;
 };
+
+/// The relMSE that the render is to reach; 0 if that is no goal.
+double relmse_goal(const RenderRequest& request);
 
 }  // namespace covary

@@ -14,7 +14,6 @@
 #include "film/film.h"
 #include "film/film_file.h"
 #include "film/image_file.h"
-#include "plans/made_file.h"
 
 namespace covary {
 namespace {

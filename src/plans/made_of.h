@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,17 @@ std::string made_of(const std::string& scene_hash, const std::vector<OptionValue
 /// does. The scene is named only if no option that changes it is. `continues`: a higher or lower limit of samples, time
 /// or error is no difference.
 std::string differences(const std::string& earlier, const std::string& now, bool continues = false);
+
+/// How the file at `path` was made, according to its attributes.
+struct MadeFile {
+  std::string made_of;  ///< empty: unknown, or there is no image
+  bool complete = false;
+  std::optional<double> predicted;  ///< relMSE
+};
+MadeFile made_file(const std::string& path);
+
+/// Whether it is complete, was made as `made_of` says apart from the goal, and its predicted relMSE is at most `until`.
+bool reaches(const MadeFile& file, const std::string& made_of, double until);
 
 /// Throws Error(kInput) if the file at `path` is an image that covary made with other settings, according to its
 /// attribute; does nothing if there is no file, or one without the attribute.

@@ -5,8 +5,6 @@
 
 #include <optional>
 
-#include "plans/made_file.h"
-
 namespace covary {
 namespace {
 

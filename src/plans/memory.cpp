@@ -12,7 +12,6 @@
 #include "passes/sample_parts.h"
 #include "passes/training.h"
 #include "plans/budget.h"
-#include "plans/first_check.h"
 #include "plans/integrator_choice.h"
 #include "plans/light_plan.h"
 #include "plans/render.h"

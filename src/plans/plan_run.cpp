@@ -12,7 +12,6 @@
 #include "passes/light_pass.h"
 #include "passes/training.h"
 #include "plans/budget.h"
-#include "plans/first_check.h"
 #include "plans/folder_lock.h"
 #include "plans/integrator_choice.h"
 #include "plans/light_plan.h"

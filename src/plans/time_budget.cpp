@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "plans/end_trials.h"
-
 namespace covary {
 namespace {
 

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -28,6 +29,12 @@ struct TimePlan {
 /// into kAuxiliaryShare of the time, and at least 1.
 TimePlan plan_time(const TimeCosts& costs, double seconds, uint32_t fewest, uint32_t aov_samples);
 inline constexpr double kAuxiliaryShare = 0.15;
+
+/// Seconds that the end takes for an image of `height` rows, from trials of few of them: trial(rows) returns its
+/// seconds, of which the first is longer because it loads what the others use. No further trial is made that would make
+/// all of them take longer than `allowed` seconds.
+double time_of_end(int height, double allowed, const std::function<double(int rows)>& trial);
+inline constexpr double kTrialShare = 0.15;  ///< of the time, for these trials
 
 /// Samples per pixel to have after the next round; `taken` if the time left suffices for no more. `left`: seconds for
 /// passes; `seconds_per_sample` > 0: of each sample per pixel.

@@ -7,8 +7,6 @@
 #include <cmath>
 #include <vector>
 
-#include "plans/end_trials.h"
-
 namespace covary {
 namespace {
 

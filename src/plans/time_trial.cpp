@@ -15,7 +15,6 @@
 #include "film/film_file.h"
 #include "integrators/aov.h"
 #include "passes/training.h"
-#include "plans/end_trials.h"
 #include "plans/pass_files.h"
 #include "plans/plan_run.h"
 #include "plans/result_files.h"
