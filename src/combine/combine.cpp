@@ -15,6 +15,7 @@
 #include "core/memory_limit.h"
 #include "core/stopwatch.h"
 #include "denoising/network_memory.h"
+#include "denoising/rows_denoising.h"
 #include "estimators/mean.h"
 #include "estimators/result_rows.h"
 #include "filters/planes.h"
@@ -165,8 +166,7 @@ int rows_in_memory(const CombineRequest& request) {
 
 double planned_memory(const CombineRequest& request) {
   const int height = request.independent.height, reach = request.estimator.reach;
-  // Bands of a mixture begin at even multiples of kRegressionCell, and have as many rows.
-  const int cells = (request.estimator.image_in_rows ? 3 : 1) * kRegressionCell;
+  const int cells = kRegressionCell + (request.estimator.image_in_rows ? kBandCell : 0);
   const int fewest = needs_whole(request) ? height : std::min(height, kFewestRows + cells + 2 * reach);
   const int rows = std::max(fewest, rows_in_memory(request));
   const double of_rows = memory_of_rows(request, rows);

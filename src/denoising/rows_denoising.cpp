@@ -16,8 +16,6 @@
 namespace covary {
 namespace {
 
-/// Bands begin with cells of all kinds.
-constexpr int kBandCell = 24;
 static_assert(kBandCell % kResidualCell == 0 && kBandCell % kRegressionCell == 0 && kBandCell % kWeighingRows == 0);
 
 /// Rows of the guides.
