@@ -175,7 +175,7 @@ std::string scenes_in(const std::string& folder) {
   std::sort(files.begin(), files.end(), [&](const std::string& a, const std::string& b) {
     return std::pair(depth(a), a) < std::pair(depth(b), b);
   });
-  if (files.empty()) return "which holds no scene (.xml, .pbrt, .gltf, .glb)";
+  if (files.empty()) return fmt::format("which holds no scene ({})", scene_file_endings());
   const size_t more = files.size() - std::min(files.size(), kMost);
   files.resize(files.size() - more);
   return fmt::format("not a scene; give one that it holds: {}{}", shell_text(files),
