@@ -112,12 +112,9 @@ void Outputs::reads(const std::vector<std::string>& paths) {
 
 void Outputs::writes(const std::string& option, const std::string& path, OutputKind kind) {
   if (kind == OutputKind::kText && (path.empty() || path == "-")) return;
-  std::error_code ignored;
-  const fs::path folder = fs::path(path).parent_path();
-  const fs::path holder = folder.has_parent_path() ? folder.parent_path() : fs::path(".");
-  if (!folder.empty() && !fs::exists(folder, ignored) && fs::is_directory(holder, ignored)) {
+  if (const std::string folder = fs::path(path).parent_path().string(); is_missing_folder(folder)) {
     check_extension(option, path, kind);
-    make_output_folder(folder.string());
+    make_output_folder(folder);
   }
   const OutputTarget target = output_target(path);
   if (!target.is_special) check_extension(option, path, kind);
