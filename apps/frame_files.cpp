@@ -88,14 +88,19 @@ std::vector<std::string> read_patterns(const FramePatterns& patterns) {
   return all;
 }
 
+/// Whether nothing more will be written to the file, as far as can be told: a file of another format is not waited for.
+bool is_finished(const std::string& path) {
+  std::error_code ignored;
+  const bool has_content = std::filesystem::file_size(path, ignored) > 0 && !ignored;
+  return is_complete_exr(path) || (has_content && !is_exr(path));
+}
+
 /// Takes frames out that a farm has not finished, unless their output is there, and returns them.
 std::vector<int> take_unfinished(std::vector<int>& frames, const FramePatterns& patterns) {
   const std::vector<std::string> all = read_patterns(patterns);
   std::vector<int> finished, left;
   for (const int frame : frames) {
-    const bool is_finished = std::ranges::all_of(
-        all, [&](const std::string& pattern) { return is_complete_exr(frame_name(pattern, frame)); });
-    if (is_finished)
+    if (std::ranges::all_of(all, [&](const std::string& pattern) { return is_finished(frame_name(pattern, frame)); }))
       finished.push_back(frame);
     else if (!std::filesystem::exists(frame_name(patterns.output, frame)))
       left.push_back(frame);

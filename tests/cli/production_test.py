@@ -119,6 +119,13 @@ class UnfinishedFarm(CliTest):
             self.write(f"b.{n:04d}.exr", noisy(f"b{n}"))
         self.assertIn("2 frames in", self.good(*DENOISE, "--resume").stderr)
 
+    def test_a_file_of_another_format_is_named(self):
+        """It is not waited for."""
+        for name in "ab":
+            self.write(f"{name}.0001.exr", noisy(name))
+        self.write("b.0001.exr", b"PF\n1 1\n-1.0\n" + bytes(12))
+        self.bad(1, "b.0001.exr: not an EXR file", *DENOISE, "--resume")
+
 
 class WatchedFolder(CliTest):
     WATCH = ("--oidn", "off", "--watch", "--idle", "5")
