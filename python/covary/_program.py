@@ -49,15 +49,16 @@ def run_program(*words: str | os.PathLike[str],
 
 def _tell_lines(file: Path, progress: Callable[[str], object], end: threading.Event) -> None:
     """Tells the newest line of the file, as often as there is one, until the end."""
-    told = ""
-    while True:
-        is_last = end.wait(_LOOK_SECONDS)
-        lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
-        if lines and lines[-1] != told:
-            told = lines[-1]
-            progress(told)
-        if is_last:
-            return
+    with file.open(encoding="utf-8", errors="replace") as lines:
+        told = ""
+        while True:
+            is_last = end.wait(_LOOK_SECONDS)
+            newest = "".join(lines.readlines()[-1:]).rstrip("\n")
+            if newest and newest != told:
+                told = newest
+                progress(told)
+            if is_last:
+                return
 
 
 #: Of exit codes; the last three as in sysexits.h.
