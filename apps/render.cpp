@@ -24,6 +24,7 @@
 #include "json_output.h"
 #include "live.h"
 #include "method_options.h"
+#include "plans/budget.h"
 #include "plans/made_of.h"
 #include "plans/pass_files.h"
 #include "plans/render.h"
