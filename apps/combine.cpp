@@ -27,11 +27,11 @@
 #include "declared_options.h"
 #include "dependent_tests/dependent_tests.h"
 #include "estimators/mean.h"
+#include "feature_layers.h"
 #include "film/film_file.h"
 #include "film/outputs.h"
 #include "frame_files.h"
 #include "gpu/target.h"
-#include "guide_layer.h"
 #include "json_output.h"
 #include "method_options.h"
 #include "metrics/provenance.h"
@@ -80,7 +80,7 @@ void check_explain(const CombineOptions& o, const Method& estimator, const Group
   if (!o.explain) return;
   const CropWindow& window = file.place().window;
   const int x = o.explain->x - window.x, y = o.explain->y - window.y;
-  if (estimator.reads_guides)
+  if (estimator.reads_features)
     throw Error(ErrorCode::kUsage,
                 "--explain: a pixel that is denoised is not a sum of control variates; see --estimator " +
                     std::string(kDefaultOfPairs));
@@ -132,12 +132,12 @@ nlohmann::ordered_json json_of(const Correlation& c) {
   return {{"value", c.value}, {"standard_error", c.standard_error}, {"pairs", c.pairs}};
 }
 
-GuideImages guides_of(const CombineOptions& o, const Method& estimator, const GroupedFile& file) {
-  if (o.guides.empty()) return {};
-  if (!estimator.reads_guides)
+FeatureImages features_of(const CombineOptions& o, const Method& estimator, const GroupedFile& file) {
+  if (o.features.empty()) return {};
+  if (!estimator.reads_features)
     throw Error(ErrorCode::kUsage,
-                "--guides is an option of --denoise auto, bias, balanced and error, not of " + estimator.name);
-  return read_guides(o.guides, file.place(), file.colours());
+                "--features is an option of --denoise auto, bias, balanced and error, not of " + estimator.name);
+  return read_features(o.features, file.place(), file.colours());
 }
 
 /// Throws Error(kUsage) if a file is used twice: it would be its own control variate, or add no information.
@@ -160,7 +160,7 @@ void check_files_of_command(const CombineOptions& o) {
   Outputs outputs;
   outputs.reads(o.crn);
   outputs.reads(o.independent);
-  for (const std::string& path : {o.light, o.counts, o.guides})
+  for (const std::string& path : {o.light, o.counts, o.features})
     if (!path.empty()) outputs.reads(path);
   outputs.writes_result("-o", o.output, OutputKind::kFilm, "combine", o.overwrite);
   outputs.writes("--json", o.json, OutputKind::kText);
@@ -185,7 +185,7 @@ struct Inputs {
   GroupedFile independent;
   std::optional<GroupedFile> light;
   std::optional<BeautyLayers> layers;
-  GuideImages guides;
+  FeatureImages features;
   CombineRequest request;
 
   explicit Inputs(const CombineOptions& o)
@@ -197,8 +197,8 @@ struct Inputs {
     request.settings = pair_settings(
         request.estimator, needs_sample_count(request.estimator) || o.counts.empty() ? o.samples : std::nullopt,
         crn ? crn->samples() : 0, o.error || (!o.json.empty() && request.estimator.predicts_error));
-    guides = guides_of(o, request.estimator, independent);
-    request.settings.guides = guides.view();
+    features = features_of(o, request.estimator, independent);
+    request.settings.features = features.view();
     check_explain(o, request.estimator, independent);
     check_stages(o.stages, request.estimator);
     take_counts(o.counts, o.samples, crn ? &*crn : nullptr, independent);
@@ -313,7 +313,7 @@ CombineOptions frame_options(const CombineOptions& o, int frame) {
   CombineOptions one = o;
   for (std::vector<std::string>* files : {&one.crn, &one.independent})
     for (std::string& path : *files) path = frame_name(path, frame);
-  for (std::string* path : {&one.light, &one.counts, &one.guides}) *path = file_of_frame(*path, frame);
+  for (std::string* path : {&one.light, &one.counts, &one.features}) *path = file_of_frame(*path, frame);
   one.output = frame_name(one.output, frame);
   if (is_frame_pattern(one.json)) one.json = frame_name(one.json, frame);
   return one;
@@ -340,7 +340,7 @@ void run(CombineOptions o) {
   }
   check_passes(o);
   o.target = gpu::Target::open(o.device);
-  FramePatterns patterns{o.independent, {o.guides, o.light}, o.output, {o.independent_layer, o.view}};
+  FramePatterns patterns{o.independent, {o.features, o.light}, o.output, {o.independent_layer, o.view}};
   o.of_frames.quiet = o.quiet;
   patterns.images.insert(patterns.images.end(), o.crn.begin(), o.crn.end());
   are_frames(o.of_frames, patterns) ? combine_frames(o, patterns) : combine_files(o);

@@ -27,6 +27,7 @@
 #include "core/stopwatch.h"
 #include "declared_options.h"
 #include "denoising/mixed_denoising.h"
+#include "feature_layers.h"
 #include "film/denoised_by.h"
 #include "film/exr_copy.h"
 #include "film/image_rows.h"
@@ -35,7 +36,6 @@
 #include "film/written_by.h"
 #include "filters/stray_values.h"
 #include "frame_files.h"
-#include "guide_layer.h"
 #include "json_output.h"
 #include "metrics/provenance.h"
 #include "network_memory.h"
@@ -59,7 +59,7 @@ struct Options {
   std::string output, mode, oidn, albedo, normal, json;
   PictureChoice choice;
   std::vector<std::string> layers;
-  bool no_guides = false, clean_guides = false, check = false, quiet = false, force = false, overwrite = false;
+  bool no_features = false, clean_features = false, check = false, quiet = false, force = false, overwrite = false;
   FrameOptions of_frames;
   std::optional<double> memory_mib;
   std::shared_ptr<const History> history;  ///< of the frame being denoised
@@ -120,8 +120,8 @@ std::vector<Task> tasks_of(const Options& o) {
   return tasks;
 }
 
-GuideLayers guides_of(const Options& o, const Task& task, const ColourSpace& colours) {
-  return GuideLayers({o.inputs, task.picture, colours, o.albedo, o.normal, o.no_guides});
+FeatureLayers features_of(const Options& o, const Task& task, const ColourSpace& colours) {
+  return FeatureLayers({o.inputs, task.picture, colours, o.albedo, o.normal, o.no_features});
 }
 
 std::map<std::string, std::string> new_attributes(const Options& o) {
@@ -149,7 +149,7 @@ Denoised denoise_by_network(const Options& o, const Task& task, ProgressLine& pr
   const std::string& input = o.inputs[0];
   const ImageInfo info = inspect_image(input);
   require_memory_of_network(input, info.place.window, o.memory_mib);
-  GuideLayers guides = guides_of(o, task, ImageRows(input, task.layer).colours());
+  FeatureLayers features = features_of(o, task, ImageRows(input, task.layer).colours());
   const PlacedImage image = read_image(input, task.layer, ChecksumPolicy::kCheck, std::nullopt);
   warn_of_values(input, image.image);
   if (const std::string by = denoised_by(info.attributes, info.channels, task.layer); !by.empty())
@@ -157,14 +157,15 @@ Denoised denoise_by_network(const Options& o, const Task& task, ProgressLine& pr
                where_to_set(RenderSetting::kNoDenoiser, written_by(info.attributes)));
   progress.begin("denoising");
   Denoiser denoiser(o.denoiser());
-  const std::string guided = guides.text();
-  const auto taken = [&](const char* name, std::optional<Image>& guide) -> std::shared_ptr<const Image> {
-    if (!guide) return nullptr;
-    Image own = *std::exchange(guide, std::nullopt);
-    return std::make_shared<const Image>(o.clean_guides ? denoiser.denoise_guide(name, own) : std::move(own));
+  const std::string guided = features.text();
+  const auto taken = [&](const char* name, std::optional<Image>& feature) -> std::shared_ptr<const Image> {
+    if (!feature) return nullptr;
+    Image own = *std::exchange(feature, std::nullopt);
+    return std::make_shared<const Image>(o.clean_features ? denoiser.denoise_feature(name, own) : std::move(own));
   };
-  const std::shared_ptr<const Image> albedo = taken("albedo", guides.albedo), normal = taken("normal", guides.normal);
-  const auto denoised = [&](const Image& noisy) { return denoiser.denoise(noisy, albedo, normal, o.clean_guides); };
+  const std::shared_ptr<const Image> albedo = taken("albedo", features.albedo),
+                                     normal = taken("normal", features.normal);
+  const auto denoised = [&](const Image& noisy) { return denoiser.denoise(noisy, albedo, normal, o.clean_features); };
   Denoised result;
   const std::vector<std::string> picture = layer_channels(input, info.channels, task.picture.layer);
   result.result.image.estimate = denoised(image.image);
@@ -206,8 +207,8 @@ Denoised denoise_by_mixture(const Options& o, const Task& task, const GroupedFil
   const DenoisingChoice choice{o.mode.empty() ? usual_denoising(kDefaultEstimator) : o.mode, o.oidn, {o.history}};
   request.estimator = make_default_estimator(false, {}, choice);
   request.settings.std_error = true;
-  const GuideLayers guides = guides_of(o, task, file.colours());
-  request.settings.guides = guides.view();
+  const FeatureLayers features = features_of(o, task, file.colours());
+  request.settings.features = features.view();
   const BeautyLayers layers(o.inputs, task.picture, o.layers, true);
   request.layers = layers.sources();
   request.force = o.force;
@@ -235,7 +236,7 @@ Denoised denoise_by_mixture(const Options& o, const Task& task, const GroupedFil
   combined->image.risks = result.result.image.risks, combined->image.note = result.result.image.note;
   result.result.aovs = std::move(combined->layers);
   const std::string what = fmt::format("{}{}: {} x {}, {} of {}, {}, in {:.2f} s", o.output, task.text(), file.width(),
-                                       file.height(), request.estimator.text, file.groups_text(), guides.text(),
+                                       file.height(), request.estimator.text, file.groups_text(), features.text(),
                                        combined->check_seconds + combined->estimate_seconds);
   result.report = [what, combined, choice] {
     fmt::print(stderr, "{}\n", what);
@@ -263,21 +264,21 @@ void write(const Options& o, const ImagePlace& place, std::vector<Denoised>& all
 }
 
 /// Whether the options select the network alone, whatever the image.
-bool is_by_network(const Options& o) { return o.mode == kNetwork || (o.mode.empty() && o.clean_guides); }
+bool is_by_network(const Options& o) { return o.mode == kNetwork || (o.mode.empty() && o.clean_features); }
 
 void check_options(const Options& o) {
   if (o.inputs.empty() || o.output.empty()) usage("expected IN.exr and -o OUT.exr, or --check");
-  if (o.no_guides && !(o.albedo + o.normal).empty()) usage("--albedo and --normal have no effect with --no-guides");
-  if (o.no_guides && o.clean_guides) usage("--clean-guides has no effect with --no-guides");
+  if (o.no_features && !(o.albedo + o.normal).empty()) usage("--albedo and --normal have no effect with --no-features");
+  if (o.no_features && o.clean_features) usage("--clean-features has no effect with --no-features");
   for (size_t i = 0; i < o.inputs.size(); ++i)
     for (size_t k = 0; k < i; ++k)
       if (is_same_file(o.inputs[i], o.inputs[k]))
         usage(fmt::format("'{}' and '{}' are the same file; renders of different seeds are needed", o.inputs[k],
                           o.inputs[i]));
   if (o.inputs.size() > 1 && is_by_network(o))
-    usage("--mode oidn and --clean-guides are for one image; covary merge makes one of films");
-  if (o.clean_guides && !is_by_network(o))
-    usage("--clean-guides is an option of --mode oidn; mixtures always denoise their auxiliary features first");
+    usage("--mode oidn and --clean-features are for one image; covary merge makes one of films");
+  if (o.clean_features && !is_by_network(o))
+    usage("--clean-features is an option of --mode oidn; mixtures always denoise their auxiliary features first");
 }
 
 /// Returns what to say about the result.
@@ -378,9 +379,9 @@ void add_denoise(CLI::App& app) {
       "Layers of the inputs to denoise with the picture's weights, so that with Rest they add up to it; 'all': those "
       "of lights, and of direct and indirect light, that Blender and Arnold write")
       ->delimiter(',');
-  command->add_flag("--no-guides", o->no_guides, "Do not use auxiliary features");
+  command->add_flag("--no-features", o->no_features, "Do not use auxiliary features");
   command->add_flag(
-      "--clean-guides", o->clean_guides,
+      "--clean-features", o->clean_features,
       "With --mode oidn, denoise the auxiliary features first: less error if they are noisy, in three times the time");
   add_value(*command, "--json", o->json, kFileValue, "File for statistics of a mixture; '-': standard output");
   command->add_option("--memory", o->memory_mib, kMemoryHelp)->check(positive_number());

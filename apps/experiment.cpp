@@ -128,8 +128,8 @@ void add_programs(const std::string& option, const std::vector<std::string>& wor
   }
 }
 
-/// A method for each program that none of the suite's refers to: it gets independent samples in groups, and guides; or
-/// renders itself.
+/// A method for each program that none of the suite's refers to: it gets independent samples in groups, and
+/// features; or renders itself.
 void add_methods_of_programs(const lab::Programs& programs, bool renders, lab::Suite& suite) {
   for (const auto& [name, command] : programs) {
     const auto refers = [&](const lab::MethodEntry& method) { return method.program == name; };

@@ -9,7 +9,7 @@
 
 namespace covary {
 
-/// Throws if the network needs too much: per pixel, images (the input, a copy, guides while they are read and the
+/// Throws if the network needs too much: per pixel, images (the input, a copy, features while they are read and the
 /// result) and, in tiles of limited size, its own values.
 void require_memory_of_network(const std::string& input, const CropWindow& window,
                                std::optional<double> permitted_mib) {

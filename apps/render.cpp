@@ -101,7 +101,7 @@ void write_stages(const RenderOptions& options, const RenderResult& result) {
   const bool is_pair = passes.size() > 1;
   MethodSettings settings;
   settings.crn_samples = std::llround(first.mean_count());
-  if (!result.aovs.empty()) settings.guides = {&result.aovs.at("Albedo"), &result.aovs.at("N")};
+  if (!result.aovs.empty()) settings.features = {&result.aovs.at("Albedo"), &result.aovs.at("N")};
   save_stages(
       options.stages, estimator_of(options),
       {is_pair ? rows_of(first, 0, first.height()) : GroupedImage{}, rows_of(independent, 0, independent.height())},

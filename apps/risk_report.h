@@ -37,7 +37,7 @@ void add_risks(const std::optional<MeasuredRisks>& risks, nlohmann::ordered_json
 /// "error_sums": the basis of the interval; nothing if unknown.
 void add_error_sums(const std::optional<RiskRow>& sums, nlohmann::ordered_json& json);
 
-/// "denoiser", the network that was used, "denoiser_runs", how many images and guides it denoised, and
+/// "denoiser", the network that was used, "denoiser_runs", how many images and features it denoised, and
 /// "denoiser_missing": that it was missing, and how to get it.
 void add_network(const std::string& network, int runs, const DenoisingChoice& choice, nlohmann::ordered_json& json);
 

@@ -119,16 +119,16 @@ class Scene:
                            min(8, spp))
         if method == "path tracing":
             return film
-        guides = self.render("guides", 2, 1, "--estimator", "none", "--denoise", "none", "--aovs")  # of any seed
+        features = self.render("features", 2, 1, "--estimator", "none", "--denoise", "none", "--aovs")  # of any seed
         output = self.folder / f"{method.replace(' ', '-')}-{spp}-{seed}.exr"
         output.unlink(missing_ok=True)
         if method.startswith("oidn"):
             albedo, normal = ("DenoisingAlbedo", "DenoisingNormal") if method == "oidn" else ("Albedo", "N")
-            self.run("denoise", film, "--mode", "oidn", "--clean-guides", "--albedo", albedo, "--normal", normal,
+            self.run("denoise", film, "--mode", "oidn", "--clean-features", "--albedo", albedo, "--normal", normal,
                      "--quiet", "-o", output)
         else:
-            self.run("combine", "--independent", film, "--guides", guides, "--denoise", "auto", "--quiet", "-o", output,
-                     *(["--oidn", "off"] if method == "own filters" else []))
+            self.run("combine", "--independent", film, "--features", features, "--denoise", "auto", "--quiet", "-o",
+                     output, *(["--oidn", "off"] if method == "own filters" else []))
         return output
 
     def errors(self, path):

@@ -52,7 +52,7 @@ class Scene:
         noisy, output = self.folder / "mitsuba.exr", self.folder / "oidn.exr"
         seconds = run(self.options.mitsuba_python, HERE / "mitsuba_picture.py", self.path, self.resolution, spp, seed,
                       noisy)
-        return output, seconds + run(self.options.covary, "denoise", noisy, "--mode", "oidn", "--clean-guides",
+        return output, seconds + run(self.options.covary, "denoise", noisy, "--mode", "oidn", "--clean-features",
                                      "--quiet", "--overwrite", "-o", output)
 
     def references(self):

@@ -42,7 +42,7 @@ def measured(scene, kind, spp, seed):
                   "--no-preview", "--quiet", *(["--resume"] if image.exists() else []), "-o", image, "--json", told)
     else:
         film = scene.render("film", spp, seed, *KINDS["mean"])
-        scene.run("combine", "--independent", film, "--guides", film, *KINDS[kind], "-o", image, "--json", told,
+        scene.run("combine", "--independent", film, "--features", film, *KINDS[kind], "-o", image, "--json", told,
                   "--quiet", "--force")
     errors = scene.error_map(read_image(image))
     noise = (scene.weight * (scene.truth[0] - scene.truth[1])**2).mean(2) / 4

@@ -86,7 +86,7 @@ def image_of(arguments, name, spp, seed, kind):
         render(arguments, write_variant(name, SCENES, arguments.work), size_of(name), spp, seed, film, "--groups",
                groups, "--aovs", "--resume", "--json", facts)
         return read_image(film), json.loads(facts.read_text())
-    films = ["--independent", film, "--guides", film]
+    films = ["--independent", film, "--features", film]
     if kind.startswith("pair"):
         films += ["--crn", arguments.work / f"{name}-{spp}-{seed}-crn.exr"]
         if kind == "pair":

@@ -79,11 +79,12 @@ Measured measured(const std::string& name, const Options& options, OnDevice on_d
 /// The default without a network.
 EstimatorResult denoised(device::Device* device, const Images& in, const gpu::Trial& trial) {
   const GroupedImage independent = in.view(in.independent);
-  const Guides guides{&in.albedo, &in.normal};
+  const Features features{&in.albedo, &in.normal};
   const FilterKinds kinds = kinds_of_mean(false);
-  if (device) return gpu::mix_mean(*device, {independent, guides, kinds, {1, 1, false}, {}, true, false}, trial).result;
-  std::vector<CandidateMaker> makers = {filtered_candidates(guides, CandidateBase::kMean, kinds)};
-  add_weighing_maker(guides, makers);
+  if (device)
+    return gpu::mix_mean(*device, {independent, features, kinds, {1, 1, false}, {}, true, false}, trial).result;
+  std::vector<CandidateMaker> makers = {filtered_candidates(features, CandidateBase::kMean, kinds)};
+  add_weighing_maker(features, makers);
   return denoise_by_mixture(parts_of_mean(independent), makers, DenoiseMode::kAuto, true).result;
 }
 

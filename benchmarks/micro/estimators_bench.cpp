@@ -133,7 +133,7 @@ void one_residual_correction(benchmark::State& state) {
   count_work(state, "flops", (441 + 441 + 121) * 40);
 }
 
-/// NL-means with two bandwidths and six planes of guides, for the image alone (1) or with both halves (3), as the
+/// NL-means with two bandwidths and six planes of features, for the image alone (1) or with both halves (3), as the
 /// candidates of a mixture are made.
 void one_nl_means(benchmark::State& state) {
   const Input& in = input();
@@ -157,11 +157,11 @@ void one_nl_means(benchmark::State& state) {
   std::vector<NlMeansSteering> steerings;
   for (size_t i = 0; i < static_cast<size_t>(state.range(0)); ++i)
     steerings.push_back({&images[i], &errors[i], {{0.5f, {&images[i]}}, {1.0f, {&images[i]}}}});
-  Planes guides(kWidth, kHeight, 6, kNlMeansRadius, 0.0f);
+  Planes features(kWidth, kHeight, 6, kNlMeansRadius, 0.0f);
   for (int i = 0; i < 6; ++i)
     for (int y = 0; y < kHeight; ++y)
-      for (int x = 0; x < kWidth; ++x) guides.row(i, y)[x] = ((x / 90 + y / 70 + i) % 2 ? 0.3f : 1.0f) / 0.2f;
-  for (auto _ : state) benchmark::DoNotOptimize(nl_means(steerings, &guides, in.valid));
+      for (int x = 0; x < kWidth; ++x) features.row(i, y)[x] = ((x / 90 + y / 70 + i) % 2 ? 0.3f : 1.0f) / 0.2f;
+  for (auto _ : state) benchmark::DoNotOptimize(nl_means(steerings, &features, in.valid));
   count(state);
   // By pair of pixels and image: distances 33 and their sums 8, two weights of 22 each, two sums of 16 each.
   count_work(state, "flops", 220.0 * (20 + static_cast<double>(state.range(0)) * (33 + 8 + 2 * (22 + 16))));

@@ -32,9 +32,9 @@ def render(scene, path, samples, groups, seed, *more, **options):
         part.rename(path)
 
 
-def make_candidates(film, guides, stages):
+def make_candidates(film, features, stages):
     if not stages.with_suffix(".exr").exists():
-        run("combine", "--independent", film, "--guides", guides, "--denoise", "auto", "--threads", 1, "--quiet",
+        run("combine", "--independent", film, "--features", features, "--denoise", "auto", "--threads", 1, "--quiet",
             "--overwrite", "--oidn", "off", "--save-stages", stages, "-o", stages.with_suffix(".exr"))
 
 

@@ -22,9 +22,9 @@ def item(folder, samples):
     """Images and features of both seeds, target, weight of its pixels, and about the error of the first candidate."""
     pair = []
     for seed in (1, 2):
-        images, variance, guides = learning.load(folder / f"f{samples}-{seed}.exr", folder / "f16-1.exr",
+        images, variance, features = learning.load(folder / f"f{samples}-{seed}.exr", folder / "f16-1.exr",
                                                  folder / f"stages{samples}-{seed}")
-        pair.append((numpy.stack(images, 2), learning.features(images, variance, guides)))
+        pair.append((numpy.stack(images, 2), learning.features(images, variance, features)))
     groups = learning.groups_of(learning.channels(folder / "reference.exr"))
     target = groups.mean(0)
     grey = numpy.maximum(learning.box(target.mean(-1), 1), 0)

@@ -57,8 +57,8 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, l
     samples: samples per pixel of the CRN image, for counts, if that is an array, and for estimators that need them.
         Without crn, of the independent image, over all groups.
     denoise: for the least error ("auto", "error"), for little bias ("bias"), balanced, or "none"; by default "auto",
-        or "none" if another estimator is named. albedo, normal, position: guides [H, W, 3], the others only with the
-        albedo; denoising_albedo, denoising_normal: guides seen through mirrors and glass (from render():
+        or "none" if another estimator is named. albedo, normal, position: features [H, W, 3], the others only with the
+        albedo; denoising_albedo, denoising_normal: features seen through mirrors and glass (from render():
         aovs["Albedo"], "N", "P", "DenoisingAlbedo", "DenoisingNormal"); oidn: Open Image Denoise's library or its
         folder, by default searched for; "off": not used.
     layers: parts of `independent` by name, such as direct light, in the same groups: denoised with it, they are in the
@@ -117,8 +117,8 @@ def _groups_first(name: str, image: Any, found: list[str]) -> Any:
     return turn(2, 0, 1, 3)
 
 
-def guides_of(aovs: Mapping[str, Any]) -> dict[str, Any]:
-    """Auxiliary images by the names of combine()'s guides; None for missing ones."""
+def features_of(aovs: Mapping[str, Any]) -> dict[str, Any]:
+    """Auxiliary images by the names of combine()'s features; None for missing ones."""
     return {name: aovs.get(layer) for name, layer in (("albedo", "Albedo"), ("normal", "N"),
                                                       ("denoising_albedo", "DenoisingAlbedo"),
                                                       ("denoising_normal", "DenoisingNormal"), ("position", "P"))}

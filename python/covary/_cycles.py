@@ -54,7 +54,7 @@ def view_layer(scene: Any) -> Any:
     return used[0] if len(used) == 1 else None
 
 
-def guides_needed(scene: Any) -> list[tuple[Any, str, Any, str]]:
+def features_needed(scene: Any) -> list[tuple[Any, str, Any, str]]:
     """As needed(), for groups that bring albedo and normal with them. Before the settings of needed()."""
     layer, image = view_layer(scene), scene.render.image_settings
     if layer is None:
@@ -99,9 +99,9 @@ def changed(scene: Any) -> list[tuple[str, Any, Any, str]]:
 
 
 @contextmanager
-def settings(scene: Any, guides: bool = False) -> Iterator[None]:
+def settings(scene: Any, features: bool = False) -> Iterator[None]:
     """Applies the required settings; afterwards restores everything, including what a group changes."""
-    wanted = [*needed(scene), *(guides_needed(scene) if guides else [])]
+    wanted = [*needed(scene), *(features_needed(scene) if features else [])]
     cycles, more = scene.cycles, ("samples", "sample_offset", "seed", "scrambling_distance", "use_sample_subset",
                                   "sample_subset_length")
     kept = [(owner, name, getattr(owner, name)) for owner, name, _, _ in wanted if hasattr(owner, name)]
@@ -151,13 +151,13 @@ class Group:
     samples: int
     seed: int
     #: Whether albedo and normal are rendered, too, if view_layer() has them.
-    guides: bool = False
+    features: bool = False
 
     @contextmanager
     def settings(self, scene: Any, path: str) -> Iterator[None]:
         """Those of the scene that write this group into a file."""
         cycles = scene.cycles
-        with settings(scene, self.guides):
+        with settings(scene, self.features):
             cycles.scrambling_distance = 0.0 if self.kind == "crn" else 1.0
             cycles.seed = self.seed
             # Samples n … 2 n - 1 of the pattern: its sample 0 lies at the pixel's centre for every seed.
@@ -173,6 +173,6 @@ class Group:
 
 def groups_of(spp: int, groups: int, seed: int, kinds: Sequence[str] = PAIR) -> list[Group]:
     """The groups of one picture, each with its own seed: of a PAIR, half of the samples have common random numbers;
-    otherwise all are INDEPENDENT, and bring what guides their denoising."""
+    otherwise all are INDEPENDENT, and bring what features their denoising."""
     return [Group(kind, spp // (len(kinds) * groups), (len(kinds) * seed + number) * groups + group, len(kinds) == 1)
             for number, kind in enumerate(kinds) for group in range(groups)]

@@ -47,7 +47,7 @@ def read_groups(paths: str | PathLike[str] | Iterable[str | PathLike[str]], laye
 def denoise(image: Any, albedo: Any = None, normal: Any = None, *, oidn: str | PathLike[str] = "") -> FloatArray:
     """Denoises the image [H, W, 3] with Open Image Denoise, if installed (`pip install pyoidn`). Biased.
 
-    albedo, normal: guides [H, W, 3], the normal only together with the albedo.
+    albedo, normal: features [H, W, 3], the normal only together with the albedo.
     oidn: its file or folder, as `covary denoise --oidn` takes it.
     """
     denoised: FloatArray = _covary.denoise(image, albedo, normal, fspath(oidn))

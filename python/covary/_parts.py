@@ -41,8 +41,8 @@ class Part:
 
 @dataclass(frozen=True)
 class Rendered:
-    """The result of a part: the films of its passes, the guides if a denoiser needs them, and the samples that count as
-    black."""
+    """The result of a part: the films of its passes, the features if a denoiser needs them, and the samples that count
+    as black."""
 
     films: dict[str, Film]
     aovs: dict[str, FloatArray] = field(default_factory=dict)

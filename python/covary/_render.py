@@ -207,8 +207,8 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     until: add samples until the predicted relMSE is this; until_p95: until it is in 95 % of the blocks of 16 x 16
         pixels; until_relative: until the relative error of each pixel (3 sigma) is, with `adaptive` or dependent-tests.
     time: seconds for rendering and estimating together.
-    denoise, oidn, device: as for combine(); the guides are rendered. The default of denoise is "auto", or "none" if an
-        estimator or `sampling` is given.
+    denoise, oidn, device: as for combine(); the features are rendered. The default of denoise is "auto", or "none" if
+        an estimator or `sampling` is given.
     output: EXR file of the result; preview: write a PNG beside it.
     passes: folder to keep the films in; resume: continue existing films; overwrite: replace them;
         checkpoint: seconds between saving unfinished films, by default 300 with `output` or `passes`; 0: never.

@@ -45,14 +45,14 @@ def changes(scene: Any) -> list[str]:
 def _layers_of(scene: Any, group: Group) -> dict[str, str]:
     """Layers of a group's file by what they are; "" is that of a file with one layer."""
     layer = _cycles.view_layer(scene)
-    if not group.guides or layer is None:
+    if not group.features or layer is None:
         return {group.kind: ""}
     return {group.kind: f"{layer.name}.Combined", "albedo": f"{layer.name}.Denoising Albedo",
             "normal": f"{layer.name}.Denoising Normal"}
 
 
 def _images(bpy: Any, scene: Any, groups: list[Group]) -> Iterator[dict[str, Any]]:
-    """Renders one group after the other: its image by its kind, and its guides."""
+    """Renders one group after the other: its image by its kind, and its features."""
     with tempfile.TemporaryDirectory(prefix="covary-blender-") as folder, _cycles.kept_in_memory(scene):
         path = str(Path(folder) / "group.exr")
         for group in groups:
@@ -109,9 +109,9 @@ def _combined(images: dict[str, list[Any]], spp: int, estimator: str, options: d
 
     kinds = [kind for kind in images if kind in _cycles.PAIR]
     films = {kind: film_from_groups(numpy.stack(images[kind]), spp // len(kinds), sampling=kind) for kind in kinds}
-    guides = {name: numpy.mean(images[name], axis=0) for name in ("albedo", "normal") if name in images}
+    features = {name: numpy.mean(images[name], axis=0) for name in ("albedo", "normal") if name in images}
     # What looks like a mistake of who rendered them is none, and only a warning: a white world seems clipped.
-    forced: dict[str, Any] = {"force": True} | guides | options
+    forced: dict[str, Any] = {"force": True} | features | options
     result = combine(films.get("crn"), films["independent"], estimator, **forced)  # type: ignore[arg-type]
     given = fields_of(result) | {"warnings": changed + result.warnings}
     return BlenderResult(**given, films=films, render_seconds=seconds)

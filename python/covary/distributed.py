@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from . import _covary
 from ._arguments import array, check_some, checked, function, mapping_of, optional, path, real, text, whole
 from ._cluster import CLIENT, SceneFiles, check_versions, dask, make_plugin, results
-from ._combine import check_options, combine, guides_of
+from ._combine import check_options, combine, features_of
 from ._experiment import experiment, main
 from ._frames import frames
 from ._options import DEFAULT, OptionValue, check_no_passes, estimators_of_films, option_texts, passes_of
@@ -239,7 +239,7 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     progress: called with (done, total) parts.
     on_image: called with the mean of all samples so far, at most every `image_seconds`.
     settings: further keywords of covary.render() for the passes: filter, sampling, sampler, groups, split.
-    options: of the estimator, and denoise and oidn, whose guides are rendered, too.
+    options: of the estimator, and denoise and oidn, whose features are rendered, too.
 
     Before anything is rendered, raises UsageError for estimators and integrators whose passes look beyond a tile, and
     for all errors in options. Raises IoError when the scheduler dies.
@@ -308,7 +308,7 @@ def _result(canvas: _Canvas, plan: _Plan, n_kept: int, seconds: float) -> Cluste
         made = RenderResult(**_covary.image_of_films(values, {}, films, canvas.aovs))
     else:
         made = combine(films["crn"], films["independent"], plan.estimator,  # type: ignore[arg-type]
-                       **{"force": True, **guides_of(canvas.aovs), **plan.options})
+                       **{"force": True, **features_of(canvas.aovs), **plan.options})
     given = fields_of(made) | {"warnings": list(canvas.warnings), "samples_per_pixel": samples,
                                "not_finite_samples": canvas.not_finite_samples,
                                "negative_samples": canvas.negative_samples, "bad_samples": canvas.bad_samples}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ._arguments import checked, either, flag, function, instance, optional, path, text, whole
-from ._combine import check_options, combine, guides_of
+from ._combine import check_options, combine, features_of
 from ._covary import most_groups
 from ._options import DEFAULT, OptionValue
 from ._render import SEED, SPP
@@ -26,7 +26,7 @@ _MOST_LANES = 1 << 32
 _LANES_OF_STACK = 1 << 24
 #: Maximum number of rows of groups traced together: positions of samples, 32-bit floats, resolve 1/4096 of a pixel.
 _ROWS_OF_STACK = 4096
-#: Maximum number of specular surfaces that guides follow.
+#: Maximum number of specular surfaces that features follow.
 _FOLLOWED_BOUNCES = 8
 _GUIDES = ("Albedo", "N", "DenoisingAlbedo", "DenoisingNormal")
 _defined: dict[str, None] = {}
@@ -156,9 +156,9 @@ def _sensor_around(mi: Any, drjit: Any) -> Any:
     return Around
 
 
-def _surface_guides(mi: Any, drjit: Any) -> Any:
-    """The class of the integrator of guides."""
-    class SurfaceGuides(mi.SamplingIntegrator):  # type: ignore[misc,unused-ignore]
+def _surface_features(mi: Any, drjit: Any) -> Any:
+    """The class of the integrator of features."""
+    class SurfaceFeatures(mi.SamplingIntegrator):  # type: ignore[misc,unused-ignore]
         """Albedo and normal of the first surface, then of the first one that is not purely specular, tinted by the
         mirrors and the glass in front of it (src/integrators/aov.h)."""
 
@@ -167,7 +167,7 @@ def _surface_guides(mi: Any, drjit: Any) -> Any:
 
         def sample(self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True) -> Any:
             hit = scene.ray_intersect(ray, active)
-            first = self._guides(hit, mi.Color3f(1.0))
+            first = self._features(hit, mi.Color3f(1.0))
             context = mi.BSDFContext()
 
             def follow(n: Any, tint: Any, hit: Any, sampler: Any) -> Any:
@@ -178,7 +178,7 @@ def _surface_guides(mi: Any, drjit: Any) -> Any:
             _, tint, behind, _ = drjit.while_loop(
                 (mi.UInt32(0), mi.Color3f(1.0), hit, sampler),
                 lambda n, tint, hit, sampler: self._single(hit) & (n < _FOLLOWED_BOUNCES), follow)
-            return mi.Spectrum(0.0), mi.Bool(True), [*first, *self._guides(behind, tint)]
+            return mi.Spectrum(0.0), mi.Bool(True), [*first, *self._features(behind, tint)]
 
         def _single(self, hit: Any) -> Any:
             """Whether the surface is purely specular."""
@@ -189,14 +189,14 @@ def _surface_guides(mi: Any, drjit: Any) -> Any:
             """The mean of a spectrum."""
             return mi.Color3f(values if len(values) == 3 else drjit.mean(values))
 
-        def _guides(self, hit: Any, tint: Any) -> list[Any]:
+        def _features(self, hit: Any, tint: Any) -> list[Any]:
             """Albedo and normal, zero if there is no surface."""
             found = hit.is_valid()
             albedo = tint * self._colour(hit.bsdf().eval_diffuse_reflectance(hit, found))
             return [*drjit.select(found, drjit.clip(albedo, 0.0, 1.0), 0.0),
                     *drjit.select(found, mi.Vector3f(hit.sh_frame.n), 0.0)]
 
-    return SurfaceGuides
+    return SurfaceFeatures
 
 
 def _define_plugins(mi: Any) -> None:
@@ -206,7 +206,7 @@ def _define_plugins(mi: Any) -> None:
     import drjit  # type: ignore[import-not-found,import-untyped,unused-ignore]
     mi.register_sampler("covary_common_numbers", _common_numbers(mi, drjit))
     mi.register_sensor("covary_around", _sensor_around(mi, drjit))
-    mi.register_integrator("covary_guides", _surface_guides(mi, drjit))
+    mi.register_integrator("covary_features", _surface_features(mi, drjit))
     _defined[mi.variant()] = None
 
 
@@ -324,12 +324,12 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
     films = {name: _film(mi, loaded, camera, chosen, name, count, groups, seed, finished)
              for name in kinds}
     denoises = (options.get("denoise") or ("auto" if estimator == DEFAULT else "none")) != "none"
-    guides = _guides(mi, loaded, camera, seed) if aovs or denoises else {}
+    features = _features(mi, loaded, camera, seed) if aovs or denoises else {}
     rendered = time.perf_counter()
-    known: dict[str, Any] = (guides_of(guides) if denoises else {}) | options
+    known: dict[str, Any] = (features_of(features) if denoises else {}) | options
     result = combine(films.get("crn"), films["independent"], estimator, **known)
     estimated = time.perf_counter()
-    given = fields_of(result) | {"warnings": warnings + result.warnings, "aovs": guides}
+    given = fields_of(result) | {"warnings": warnings + result.warnings, "aovs": features}
     return MitsubaResult(**given, films=films, render_seconds=rendered - started,
                          estimate_seconds=estimated - rendered)
 
@@ -370,11 +370,11 @@ def _film(mi: Any, scene: Any, camera: Any, integrator: Any, sampling: str, coun
     return film_from_groups(numpy.stack(images), count, sampling=sampling)
 
 
-def _guides(mi: Any, scene: Any, camera: Any, seed: int) -> dict[str, FloatArray]:
+def _features(mi: Any, scene: Any, camera: Any, seed: int) -> dict[str, FloatArray]:
     import numpy
 
     around = _around(mi, camera, {"type": "independent", "sample_count": 16})
-    integrator = mi.load_dict({"type": "covary_guides"})
+    integrator = mi.load_dict({"type": "covary_features"})
     image = integrator.render(scene, around, seed=((2 * seed + 1) * 4096 + 4095) % (1 << 32), spp=16)
     values = numpy.array(image, dtype=numpy.float32)[..., -3 * len(_GUIDES):]
     return {name: numpy.ascontiguousarray(values[..., 3 * i:3 * i + 3]) for i, name in enumerate(_GUIDES)}

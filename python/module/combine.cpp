@@ -173,14 +173,14 @@ DenoisingChoice denoising_of(const std::string& estimator, const std::string& mo
   return settings_from<DenoisingChoice>(values);
 }
 
-/// The guides of --denoise.
-struct GuideImages {
+/// The features of --denoise.
+struct FeatureImages {
   Image albedo, normal, denoising_albedo, denoising_normal, position;
-  GuideImages(const Beside& beside, const Method& estimator, const Input& image) {
+  FeatureImages(const Beside& beside, const Method& estimator, const Input& image) {
     const std::string shape = fmt::format("{}, {}, 3", image.height(), image.width());
     const auto take = [&](nb::handle array, const char* name, Image& to) {
       if (array.is_none()) return;
-      if (!estimator.reads_guides)
+      if (!estimator.reads_features)
         throw Error(ErrorCode::kUsage, std::string(name) +
                                            ": auxiliary features are for denoising, with denoise='auto', "
                                            "'bias', 'balanced' or 'error'");
@@ -191,8 +191,8 @@ struct GuideImages {
     take(beside.denoising_albedo, "denoising_albedo", denoising_albedo);
     take(beside.denoising_normal, "denoising_normal", denoising_normal);
     take(beside.position, "position", position);
-    const auto needs = [](const Image& guide, const Image& other, const char* name, const char* other_name) {
-      if (guide.data.empty() || !other.data.empty()) return;
+    const auto needs = [](const Image& feature, const Image& other, const char* name, const char* other_name) {
+      if (feature.data.empty() || !other.data.empty()) return;
       throw Error(ErrorCode::kUsage, fmt::format("{}: it has an effect only together with {}", name, other_name));
     };
     needs(normal, albedo, "normal", "the albedo");
@@ -200,7 +200,7 @@ struct GuideImages {
     needs(denoising_normal, denoising_albedo, "denoising_normal", "denoising_albedo");
     if (!normal.data.empty()) needs(denoising_albedo, denoising_normal, "denoising_albedo", "denoising_normal");
   }
-  Guides view() const {
+  Features view() const {
     const auto or_null = [](const Image& image) { return image.data.empty() ? nullptr : &image; };
     return {or_null(albedo), or_null(normal), or_null(denoising_albedo), or_null(denoising_normal), or_null(position)};
   }
@@ -243,8 +243,8 @@ nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, c
   request.settings =
       pair_settings(estimator, needs_sample_count(estimator) || !has_counts ? arguments.samples : std::nullopt,
                     pair.crn_samples(), arguments.std_error.value_or(estimator.predicts_error));
-  const GuideImages guides(beside, estimator, pair.independent);
-  request.settings.guides = guides.view();
+  const FeatureImages features(beside, estimator, pair.independent);
+  request.settings.features = features.view();
   pair.take_layers(beside.layers);
   if (has_counts) pair.take_counts(nb::cast<Counts>(beside.counts), arguments.samples);
   request.force = arguments.force;

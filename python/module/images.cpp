@@ -80,8 +80,8 @@ nb::object denoised(nb::object image, nb::object albedo, nb::object normal, cons
   if (!normal.is_none()) n = image_of(normal, "normal");
   if (a.data.empty() && !n.data.empty())
     throw Error(ErrorCode::kUsage, "normal: it has an effect only together with the albedo");
-  check_guide("albedo", a);
-  check_guide("normal", n);
+  check_feature("albedo", a);
+  check_feature("normal", n);
   Image result;
   const auto compute = [&] {
     result = denoise(rgb, a.data.empty() ? nullptr : &a, n.data.empty() ? nullptr : &n, {library});

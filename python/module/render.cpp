@@ -213,7 +213,7 @@ nb::dict image_of_films(const Options& values, const Options& of_estimator, nb::
       [&](WorkState& state) {
         const Stopwatch watch;
         Beside beside;
-        if (plan.method->reads_guides) beside.guides = guides_among(result.aovs);
+        if (plan.method->reads_features) beside.features = features_among(result.aovs);
         const int height = result.passes[0].film.height();
         const auto estimate = [&] { result.image = finish(image_of(plan, result.passes, 0, height, beside)); };
         if (!run_stoppable(state, estimate)) return;

@@ -127,18 +127,18 @@ double memory_of_rows(const CombineRequest& request, int rows) {
   const bool holds_out = request.settings.std_error && request.settings.held_out;
   const int groups = holds_out ? std::min(request.crn ? crn_groups : all_groups, request.independent.groups) : 0;
   const double values = kImage * all_groups + 2 * kCount;
-  const Guides& guides = request.settings.guides;
-  double n_guides = 0;
+  const Features& features = request.settings.features;
+  double n_features = 0;
   for (const Image* guide :
-       {guides.albedo, guides.normal, guides.denoising_albedo, guides.denoising_normal, guides.position})
-    n_guides += guide != nullptr;
+       {features.albedo, features.normal, features.denoising_albedo, features.denoising_normal, features.position})
+    n_features += guide != nullptr;
   const bool in_bands = rows < request.independent.height;
   // For bands: the estimate of the whole image; its standard error and bias are stored beside them.
-  const double of_whole = n_guides * kImage + (in_bands ? 3 * kImage + request.estimator.memory.of_whole : 0);
+  const double of_whole = n_features * kImage + (in_bands ? 3 * kImage + request.estimator.memory.of_whole : 0);
   const double library = request.estimator.network.empty() ? 0 : network_library_memory();
   const double results = of_whole * width * request.independent.height + library;
   const double layers = request.layers.empty() ? 0 : static_cast<double>(request.layers.size() + 1);
-  return n_pixels * (values + layers * layer_bytes(request.independent.groups) + (in_bands ? n_guides * kImage : 0)) +
+  return n_pixels * (values + layers * layer_bytes(request.independent.groups) + (in_bands ? n_features * kImage : 0)) +
          request.estimator.memory.bytes(n_pixels, groups) + results;
 }
 

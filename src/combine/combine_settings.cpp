@@ -58,8 +58,8 @@ void declare(Settings& s, CombineSettings& v) {
   v.denoising.mode = usual_denoising(v.estimator);
   declare(s, v.denoising);
   s.group("");
-  s.text("guides", v.guides, "FILE", "For denoising: image (EXR) of the same pixels with the layers Albedo, N and P",
-         kFile);
+  s.text("features", v.features, "FILE",
+         "For denoising: image (EXR) of the same pixels with the layers Albedo, N and P", kFile);
   s.texts("layers", v.layers, "LAYER",
           "For denoising: layers of the independent image's files to denoise with it; with Rest, they add up to the "
           "result");

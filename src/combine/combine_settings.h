@@ -29,14 +29,14 @@ struct CombineSettings {
   std::string crn_layer, independent_layer;  ///< for files with several layers
   std::string counts;                        ///< file with the samples of each pixel of the independent image
   std::string light;                         ///< film of light paths
-  std::string guides;                        ///< file with the guides of the denoising
+  std::string features;                      ///< file with the features of the denoising
   std::vector<std::string> layers;           ///< of the independent image's files, to be denoised as it is
   std::string estimator = kDefaultEstimator;
   std::optional<int> samples;  ///< samples per pixel of the CRN image
   DenoisingChoice denoising;
   std::string device = "cpu";  ///< where it runs, as gpu::Target::open() takes it
   bool error = false;          ///< also estimate the standard error
-  bool force = false;  ///< combine despite errors in the inputs
+  bool force = false;          ///< combine despite errors in the inputs
   std::optional<PixelPosition> explain;
   std::optional<double> memory_mib;  ///< memory limit
 };

@@ -19,7 +19,7 @@ namespace {
 constexpr float kLeastAlbedo = 0.02f;
 
 /// Copies an image's channels, divided by `unit`, to the planes from index `first` on.
-void copy_guide(const Image& image, float unit, int first, Planes& planes) {
+void copy_feature(const Image& image, float unit, int first, Planes& planes) {
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x)
       for (int c = 0; c < 3; ++c) planes.row(first + c, y)[x] = image.pixel(x, y)[c] / unit;
@@ -33,26 +33,26 @@ Image combined(const Image& a, const Image& b, const Operation& operation) {
   return result;
 }
 
-struct FilterGuides : RegressionGuides {
+struct FilterFeatures : RegressionFeatures {
   Planes all, normal;
   Image albedo;       // at least kLeastAlbedo; empty where there is none
   int first_row = 0;  // of a larger image
 };
 
-FilterGuides filter_guides(const Guides& guides, FilterKinds kinds) {
-  FilterGuides result{regression_guides(guides, kinds)};
+FilterFeatures filter_features(const Features& features, FilterKinds kinds) {
+  FilterFeatures result{regression_features(features, kinds)};
   const auto planes = [&](const Image& like, int count) {
     return Planes(like.width, like.height, count, kNlMeansRadius, 0.0f);
   };
-  if (!guides.albedo) return result;
-  result.all = planes(*guides.albedo, guides.normal ? 6 : 3);
-  copy_guide(*guides.albedo, kAlbedoUnit, 0, result.all);
-  result.albedo = *guides.albedo;
+  if (!features.albedo) return result;
+  result.all = planes(*features.albedo, features.normal ? 6 : 3);
+  copy_feature(*features.albedo, kAlbedoUnit, 0, result.all);
+  result.albedo = *features.albedo;
   for (float& value : result.albedo.data) value = std::max(value, kLeastAlbedo);
-  if (!guides.normal) return result;
-  result.normal = planes(*guides.normal, 3);
-  copy_guide(*guides.normal, kNormalUnit, 3, result.all);
-  copy_guide(*guides.normal, kNormalUnit, 0, result.normal);
+  if (!features.normal) return result;
+  result.normal = planes(*features.normal, 3);
+  copy_feature(*features.normal, kNormalUnit, 3, result.all);
+  copy_feature(*features.normal, kNormalUnit, 0, result.normal);
   return result;
 }
 
@@ -60,50 +60,50 @@ const Planes* or_null(const Planes& planes) { return planes.count() > 0 ? &plane
 
 /// The sources filtered by regression; `others`: their images by another filter. Coarse for halves, which serve only to
 /// find weights.
-std::vector<Image> regressed(const FilterGuides& guides, const CandidateInput& in, std::vector<const Image*> sources,
-                             std::span<const Image> others) {
-  RegressionInput input{in.estimate,     in.std_error, std::move(sources), {},
-                        guides.position, in.part > 0,  guides.first_row};
+std::vector<Image> regressed(const FilterFeatures& features, const CandidateInput& in,
+                             std::vector<const Image*> sources, std::span<const Image> others) {
+  RegressionInput input{in.estimate,       in.std_error, std::move(sources), {},
+                        features.position, in.part > 0,  features.first_row};
   for (const Image& other : others) input.others.push_back(&other);
-  return regressed(input, guides.features, *in.valid);
+  return regressed(input, features.features, *in.valid);
 }
 
 /// The candidates of each input.
-std::vector<std::vector<Image>> filtered(const FilterGuides& guides, CandidateBase base,
+std::vector<std::vector<Image>> filtered(const FilterFeatures& features, CandidateBase base,
                                          std::span<const CandidateInput> inputs) {
   std::vector<std::vector<Image>> all(inputs.size());
   std::vector<NlMeansSteering> steerings;
   std::vector<Image> images;
-  if (guides.nl_means) {
+  if (features.nl_means) {
     for (const CandidateInput& in : inputs) {
       std::vector<const Image*> sharp = {in.estimate};
       if (base == CandidateBase::kPair) sharp.push_back(in.independent);
       steerings.push_back({in.estimate, in.std_error, {{kSharpBandwidth, sharp}, {kSmoothBandwidth, {in.estimate}}}});
     }
-    images = nl_means(steerings, or_null(guides.all), *inputs[0].valid, guides.first_row);
+    images = nl_means(steerings, or_null(features.all), *inputs[0].valid, features.first_row);
     const size_t n = images.size() / inputs.size();
     for (size_t i = 0; i < images.size(); ++i) all[i / n].push_back(std::move(images[i]));
-    if (guides.albedo.data.empty()) return all;
+    if (features.albedo.data.empty()) return all;
     steerings.clear();
   }
   std::deque<Image> demodulated;
   for (const CandidateInput& in : inputs) {
-    const Image& image = demodulated.emplace_back(combined(*in.estimate, guides.albedo, std::divides<>()));
-    const Image& error = demodulated.emplace_back(combined(*in.std_error, guides.albedo, std::divides<>()));
+    const Image& image = demodulated.emplace_back(combined(*in.estimate, features.albedo, std::divides<>()));
+    const Image& error = demodulated.emplace_back(combined(*in.std_error, features.albedo, std::divides<>()));
     steerings.push_back({&image, &error, {{kSharpBandwidth, {&image}}}});
   }
-  images = nl_means(steerings, or_null(guides.normal), *inputs[0].valid, guides.first_row);
+  images = nl_means(steerings, or_null(features.normal), *inputs[0].valid, features.first_row);
   demodulated.clear(), steerings.clear();
   for (size_t i = 0; i < all.size(); ++i) {
-    all[i].push_back(combined(images[i], guides.albedo, std::multiplies<>()));
-    if (!guides.features.empty())
-      all[i].insert(all[i].begin(), regressed(guides, inputs[i], {inputs[i].estimate}, {&all[i].back(), 1})[0]);
+    all[i].push_back(combined(images[i], features.albedo, std::multiplies<>()));
+    if (!features.features.empty())
+      all[i].insert(all[i].begin(), regressed(features, inputs[i], {inputs[i].estimate}, {&all[i].back(), 1})[0]);
   }
   return all;
 }
 
 /// Filters layers with the weights of each candidate.
-std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, const CandidateInput& in,
+std::vector<std::vector<Image>> filtered_layers(const FilterFeatures& features, const CandidateInput& in,
                                                 std::span<const Image> layers) {
   const auto n = static_cast<ptrdiff_t>(layers.size());
   std::vector<const Image*> sources;
@@ -111,44 +111,44 @@ std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, cons
   std::vector<NlMeansSteering> steerings;
   std::vector<Image> images;
   std::vector<std::vector<Image>> all;
-  if (guides.nl_means) {
+  if (features.nl_means) {
     steerings = {{in.estimate, in.std_error, {{kSharpBandwidth, sources}, {kSmoothBandwidth, sources}}}};
-    images = nl_means(steerings, or_null(guides.all), *in.valid, guides.first_row);
+    images = nl_means(steerings, or_null(features.all), *in.valid, features.first_row);
     all.emplace_back(images.begin(), images.begin() + n);
     all.emplace_back(images.begin() + n, images.end());
-    if (guides.albedo.data.empty()) return all;
+    if (features.albedo.data.empty()) return all;
   }
   std::deque<Image> demodulated;
   for (const Image* source : {in.estimate, in.std_error})
-    demodulated.push_back(combined(*source, guides.albedo, std::divides<>()));
+    demodulated.push_back(combined(*source, features.albedo, std::divides<>()));
   std::vector<const Image*> without_albedo;
   for (const Image& layer : layers)
-    without_albedo.push_back(&demodulated.emplace_back(combined(layer, guides.albedo, std::divides<>())));
+    without_albedo.push_back(&demodulated.emplace_back(combined(layer, features.albedo, std::divides<>())));
   steerings = {{&demodulated[0], &demodulated[1], {{kSharpBandwidth, without_albedo}}}};
-  images = nl_means(steerings, or_null(guides.normal), *in.valid, guides.first_row);
-  for (Image& image : images) image = combined(image, guides.albedo, std::multiplies<>());
+  images = nl_means(steerings, or_null(features.normal), *in.valid, features.first_row);
+  for (Image& image : images) image = combined(image, features.albedo, std::multiplies<>());
   all.push_back(std::move(images));
-  if (!guides.features.empty()) all.insert(all.begin(), regressed(guides, in, sources, all.back()));
+  if (!features.features.empty()) all.insert(all.begin(), regressed(features, in, sources, all.back()));
   return all;
 }
 
-/// Open Image Denoise with guides that it prefilters unless they are clean.
-class GuidedNetwork {
+/// Open Image Denoise with features that it prefilters unless they are clean.
+class NetworkWithFeatures {
  public:
-  GuidedNetwork(const Guides& guides, const DenoiseOptions& options) : denoiser_(options) {
-    if (!guides.albedo) return;
-    const auto clean = [&](const char* name, const Image& guide) {
-      return std::make_shared<const Image>(guides.clean ? guide : denoiser_.denoise_guide(name, guide));
+  NetworkWithFeatures(const Features& features, const DenoiseOptions& options) : denoiser_(options) {
+    if (!features.albedo) return;
+    const auto clean = [&](const char* name, const Image& feature) {
+      return std::make_shared<const Image>(features.clean ? feature : denoiser_.denoise_feature(name, feature));
     };
-    albedo_ = clean("albedo", *guides.albedo);
-    if (guides.normal) normal_ = clean("normal", *guides.normal);
+    albedo_ = clean("albedo", *features.albedo);
+    if (features.normal) normal_ = clean("normal", *features.normal);
   }
 
   int runs() const { return denoiser_.runs(); }
   /// `image` is already mirrored.
   Image denoise(Image image, Mirror mirror = Mirror::kNone) {
-    const auto turned = [&](const std::shared_ptr<const Image>& guide) {
-      return guide && mirror != Mirror::kNone ? std::make_shared<const Image>(mirrored(*guide, mirror)) : guide;
+    const auto turned = [&](const std::shared_ptr<const Image>& feature) {
+      return feature && mirror != Mirror::kNone ? std::make_shared<const Image>(mirrored(*feature, mirror)) : feature;
     };
     return denoiser_.denoise(std::move(image), turned(albedo_), turned(normal_), true);
   }
@@ -158,7 +158,7 @@ class GuidedNetwork {
   std::shared_ptr<const Image> albedo_, normal_;
 };
 
-void denoise_all(GuidedNetwork& network, std::span<Image> images) {
+void denoise_all(NetworkWithFeatures& network, std::span<Image> images) {
   denoise_with_halves(images, [&](Image image, Mirror mirror) { return network.denoise(std::move(image), mirror); });
 }
 
@@ -186,20 +186,21 @@ CandidateMaker::Make one_by_one(std::function<std::vector<Image>(const Candidate
   };
 }
 
-RegressionGuides regression_guides(const Guides& guides, FilterKinds kinds) {
-  RegressionGuides result;
-  if (!guides.albedo || kinds == FilterKinds::kNlMeans) return result;
+RegressionFeatures regression_features(const Features& features, FilterKinds kinds) {
+  RegressionFeatures result;
+  if (!features.albedo || kinds == FilterKinds::kNlMeans) return result;
   result.nl_means = kinds == FilterKinds::kAll;
-  const Guides behind_glass = network_guides(guides);
+  const Features behind_glass = network_features(features);
   result.features.push_back(behind_glass.albedo);
   if (behind_glass.normal) result.features.push_back(behind_glass.normal);
-  if (behind_glass.normal && behind_glass.normal->data != guides.normal->data) result.features.push_back(guides.normal);
-  result.position = guides.position;
+  if (behind_glass.normal && behind_glass.normal->data != features.normal->data)
+    result.features.push_back(features.normal);
+  result.position = features.position;
   return result;
 }
 
-std::vector<std::string> filter_names(const Guides& guides, CandidateBase base, FilterKinds kinds) {
-  const RegressionGuides regression = regression_guides(guides, kinds);
+std::vector<std::string> filter_names(const Features& features, CandidateBase base, FilterKinds kinds) {
+  const RegressionFeatures regression = regression_features(features, kinds);
   std::vector<std::string> names;
   if (!regression.features.empty()) names.emplace_back("regression");
   if (regression.nl_means) {
@@ -207,15 +208,15 @@ std::vector<std::string> filter_names(const Guides& guides, CandidateBase base, 
     if (base == CandidateBase::kPair) names.emplace_back("sharp-independent");
     names.emplace_back("smooth");
   }
-  if (guides.albedo) names.emplace_back("demodulated");
+  if (features.albedo) names.emplace_back("demodulated");
   return names;
 }
 
-CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base, FilterKinds kinds, int first_row) {
-  const auto kept = std::make_shared<FilterGuides>(filter_guides(guides, kinds));
+CandidateMaker filtered_candidates(const Features& features, CandidateBase base, FilterKinds kinds, int first_row) {
+  const auto kept = std::make_shared<FilterFeatures>(filter_features(features, kinds));
   kept->first_row = first_row;
   CandidateMaker maker;
-  maker.names = filter_names(guides, base, kinds);
+  maker.names = filter_names(features, base, kinds);
   maker.make = [kept, base](std::span<const CandidateInput> inputs) { return filtered(*kept, base, inputs); };
   maker.make_layers = [kept](const CandidateInput& input, std::span<const Image> layers) {
     return filtered_layers(*kept, input, layers);
@@ -223,28 +224,28 @@ CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base, Fil
   return maker;
 }
 
-void check_guides(const Guides& guides) {
-  if (guides.albedo) check_guide("the albedo", *guides.albedo);
-  if (guides.normal) check_guide("the normal", *guides.normal);
-  if (guides.denoising_albedo) check_guide("the albedo behind glass", *guides.denoising_albedo);
-  if (guides.denoising_normal) check_guide("the normal behind glass", *guides.denoising_normal);
-  if (guides.position) check_guide("the position", *guides.position);
+void check_features(const Features& features) {
+  if (features.albedo) check_feature("the albedo", *features.albedo);
+  if (features.normal) check_feature("the normal", *features.normal);
+  if (features.denoising_albedo) check_feature("the albedo behind glass", *features.denoising_albedo);
+  if (features.denoising_normal) check_feature("the normal behind glass", *features.denoising_normal);
+  if (features.position) check_feature("the position", *features.position);
 }
 
-Guides network_guides(const Guides& guides) {
-  const bool has_both = guides.denoising_albedo && (guides.denoising_normal || !guides.normal);
-  if (!has_both) return {guides.albedo, guides.normal, nullptr, nullptr, nullptr, guides.clean};
-  return {guides.denoising_albedo, guides.denoising_normal, nullptr, nullptr, nullptr, guides.clean};
+Features network_features(const Features& features) {
+  const bool has_both = features.denoising_albedo && (features.denoising_normal || !features.normal);
+  if (!has_both) return {features.albedo, features.normal, nullptr, nullptr, nullptr, features.clean};
+  return {features.denoising_albedo, features.denoising_normal, nullptr, nullptr, nullptr, features.clean};
 }
 
-NetworkImages network_images(const Guides& guides, const DenoiseOptions& options, std::array<Image, 3> images) {
-  GuidedNetwork network(network_guides(guides), options);
+NetworkImages network_images(const Features& features, const DenoiseOptions& options, std::array<Image, 3> images) {
+  NetworkWithFeatures network(network_features(features), options);
   const bool has_halves = !images[1].data.empty();
   denoise_all(network, std::span(images).first(has_halves ? 3 : 1));
   return {std::move(images), network.runs()};
 }
 
-CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& options, CandidateBase base,
+CandidateMaker neural_candidates(const Features& features, const DenoiseOptions& options, CandidateBase base,
                                  std::shared_ptr<const NetworkImages> made) {
   const bool is_mean = base == CandidateBase::kMean;
   CandidateMaker maker;
@@ -259,7 +260,7 @@ CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& opt
     });
     return maker;
   }
-  const auto network = std::make_shared<GuidedNetwork>(network_guides(guides), options);
+  const auto network = std::make_shared<NetworkWithFeatures>(network_features(features), options);
   maker.runs = [network] { return network->runs(); };
   maker.make = [network, base](std::span<const CandidateInput> inputs) {
     std::vector<Image> clean;

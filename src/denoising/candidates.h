@@ -2,10 +2,10 @@
 // Candidates for mixture.h: images with less noise and more bias than the one they are made of.
 //
 // Without a neural network, the candidates come from NL-means (nl_means.h), whose weights use the estimator's image,
-// its standard error, and albedo and normal as guides: that image at two bandwidths; the independent image with the
-// same weights; and the image divided by albedo, filtered with the normal as its only guide, and multiplied by albedo
+// its standard error, and albedo and normal as features: that image at two bandwidths; the independent image with the
+// same weights; and the image divided by albedo, filtered with the normal as its only feature, and multiplied by albedo
 // again. For a mean, a regression on albedo, normal and position can replace the first two. Open Image Denoise uses
-// prefiltered guides. For a pair, it denoises the independent image only: errors of the other are correlated between
+// prefiltered features. For a pair, it denoises the independent image only: errors of the other are correlated between
 // pixels, which the network was not trained on.
 //
 // If the image itself is the mean of the independent samples, no candidates are made from the independent image, and
@@ -76,23 +76,23 @@ inline FilterKinds kinds_of_mean(bool with_network) { return with_network ? Filt
 /// Scales of differences of albedos and normals, and bandwidths of the sharp and the smooth filter.
 inline constexpr float kAlbedoUnit = 0.07f, kNormalUnit = 0.2f, kSharpBandwidth = 0.5f, kSmoothBandwidth = 1;
 /// What the regression fits the image to; nothing if it is not used, or if there is no albedo.
-struct RegressionGuides {
+struct RegressionFeatures {
   std::vector<const Image*> features;
   const Image* position = nullptr;  ///< or null
   bool nl_means = true;             ///< whether NL-means filters the image itself, too
 };
-RegressionGuides regression_guides(const Guides& guides, FilterKinds kinds);
+RegressionFeatures regression_features(const Features& features, FilterKinds kinds);
 /// The names of filtered_candidates(), in order.
-std::vector<std::string> filter_names(const Guides& guides, CandidateBase base, FilterKinds kinds);
-/// Candidates without a network. The guides must outlive the result. `first_row`: of a larger image if these are rows
+std::vector<std::string> filter_names(const Features& features, CandidateBase base, FilterKinds kinds);
+/// Candidates without a network. The features must outlive the result. `first_row`: of a larger image if these are rows
 /// of it, a multiple of kRegressionCell; kCandidateReach rows from those that are missing, the bits are those of the
 /// whole.
-CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base = CandidateBase::kPair,
+CandidateMaker filtered_candidates(const Features& features, CandidateBase base = CandidateBase::kPair,
                                    FilterKinds kinds = FilterKinds::kNlMeans, int first_row = 0);
-/// Throws Error(kInput) for auxiliary images with values that cannot be used (check_guide() of denoise.h).
-void check_guides(const Guides& guides);
-/// The guides for a neural network: those seen in mirrors and through glass, if available.
-Guides network_guides(const Guides& guides);
+/// Throws Error(kInput) for auxiliary images with values that cannot be used (check_feature() of denoise.h).
+void check_features(const Features& features);
+/// The features for a neural network: those seen in mirrors and through glass, if available.
+Features network_features(const Features& features);
 
 /// Residual correction of a network's image in two widths.
 inline constexpr std::array<ResidualOptions, 2> kNetworkResiduals = {{{0.5f, 61, 4}, {0.3f, 41, 2}}};
@@ -104,11 +104,11 @@ struct NetworkImages {
 };
 /// `images`: what is denoised, of all samples and of both halves, or all samples alone with empty images of the halves.
 /// Throws like denoise().
-NetworkImages network_images(const Guides& guides, const DenoiseOptions& options, std::array<Image, 3> images);
+NetworkImages network_images(const Features& features, const DenoiseOptions& options, std::array<Image, 3> images);
 
 /// Images denoised by a neural network. `made`: its images, if they are made already; otherwise they are made, which
 /// takes all samples alone or with both halves, and throws like denoise().
-CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& options,
+CandidateMaker neural_candidates(const Features& features, const DenoiseOptions& options,
                                  CandidateBase base = CandidateBase::kPair,
                                  std::shared_ptr<const NetworkImages> made = nullptr);
 

@@ -164,13 +164,13 @@ Api load(const DenoiseOptions& options, std::string* path = nullptr) {
   return api;
 }
 
-void check_size(const char* name, const Image& rgb, const Image* guide) {
-  if (guide && (guide->width != rgb.width || guide->height != rgb.height || guide->channels != 3))
+void check_size(const char* name, const Image& rgb, const Image* feature) {
+  if (feature && (feature->width != rgb.width || feature->height != rgb.height || feature->channels != 3))
     throw Error(
         ErrorCode::kInput,
         fmt::format(
             "denoise: the {} is {} x {} with {} channels, the image {} x {}; expected 3 channels and the same size",
-            name, guide->width, guide->height, guide->channels, rgb.width, rgb.height));
+            name, feature->width, feature->height, feature->channels, rgb.width, rgb.height));
 }
 
 /// The image with 0 in place of values that are not finite.
@@ -232,7 +232,7 @@ namespace {
 struct Run {
   std::shared_ptr<const Denoiser::Library> library;
   std::vector<std::pair<const char*, std::shared_ptr<const Image>>> inputs;  ///< by the filter's names; at least one
-  bool hdr = false, clean_guides = false, small_network = false;
+  bool hdr = false, clean_features = false, small_network = false;
   Image result;
   std::atomic<bool> cancelled{false};
 
@@ -251,7 +251,7 @@ struct Run {
     result = Image(inputs.front().second->width, inputs.front().second->height, 3);
     set("output", result);
     if (hdr) api.set_bool(filter.get(), "hdr", true);
-    if (clean_guides) api.set_bool(filter.get(), "cleanAux", true);
+    if (clean_features) api.set_bool(filter.get(), "cleanAux", true);
     if (small_network) api.set_int(filter.get(), "quality", Api::kBalancedQuality);
     api.set_progress(
         filter.get(), [](void* data, double) { return !static_cast<std::atomic<bool>*>(data)->load(); }, &cancelled);
@@ -270,27 +270,27 @@ Image image_of(const std::shared_ptr<Run>& run) {
 
 }  // namespace
 
-void check_guide(const std::string& name, const Image& guide) {
-  const auto it = std::find_if(guide.data.begin(), guide.data.end(), [](float v) { return !std::isfinite(v); });
-  if (it == guide.data.end()) return;
-  const auto pixel = static_cast<int>((it - guide.data.begin()) / guide.channels);
+void check_feature(const std::string& name, const Image& feature) {
+  const auto it = std::find_if(feature.data.begin(), feature.data.end(), [](float v) { return !std::isfinite(v); });
+  if (it == feature.data.end()) return;
+  const auto pixel = static_cast<int>((it - feature.data.begin()) / feature.channels);
   throw Error(ErrorCode::kInput, fmt::format("{} holds the value {} at pixel ({}, {}); all values of auxiliary "
                                              "features must be finite",
-                                             name, *it, pixel % guide.width, pixel / guide.width));
+                                             name, *it, pixel % feature.width, pixel / feature.width));
 }
 
 Denoiser::Denoiser(const DenoiseOptions& options) : library_(std::make_shared<Library>(options)) {}
 Denoiser::~Denoiser() = default;
 
-Image Denoiser::denoise(Image rgb, const Image* albedo, const Image* normal, bool clean_guides) {
-  return denoise(std::move(rgb), copy_of(albedo), copy_of(normal), clean_guides);
+Image Denoiser::denoise(Image rgb, const Image* albedo, const Image* normal, bool clean_features) {
+  return denoise(std::move(rgb), copy_of(albedo), copy_of(normal), clean_features);
 }
 
 Image Denoiser::denoise(Image rgb, std::shared_ptr<const Image> albedo, std::shared_ptr<const Image> normal,
-                        bool clean_guides) {
+                        bool clean_features) {
   check_images(rgb, albedo.get(), normal.get());
   const auto run = std::make_shared<Run>();
-  run->library = library_, run->hdr = true, run->clean_guides = clean_guides && albedo;
+  run->library = library_, run->hdr = true, run->clean_features = clean_features && albedo;
   run->inputs.emplace_back("color", std::make_shared<const Image>(with_usable_values(std::move(rgb))));
   if (albedo) run->inputs.emplace_back("albedo", finite(albedo));
   if (normal) run->inputs.emplace_back("normal", finite(normal));
@@ -298,12 +298,12 @@ Image Denoiser::denoise(Image rgb, std::shared_ptr<const Image> albedo, std::sha
   return image_of(run);
 }
 
-Image Denoiser::denoise_guide(const std::string& name, const Image& guide) {
-  COVARY_CHECK(name == "albedo" || name == "normal", "a guide is an albedo or a normal");
-  check_images(guide, nullptr, nullptr);
+Image Denoiser::denoise_feature(const std::string& name, const Image& feature) {
+  COVARY_CHECK(name == "albedo" || name == "normal", "a feature is an albedo or a normal");
+  check_images(feature, nullptr, nullptr);
   const auto run = std::make_shared<Run>();
   run->library = library_;
-  run->inputs.emplace_back(name == "albedo" ? "albedo" : "normal", finite(copy_of(&guide)));
+  run->inputs.emplace_back(name == "albedo" ? "albedo" : "normal", finite(copy_of(&feature)));
   run->small_network = true;
   ++runs_;
   return image_of(run);

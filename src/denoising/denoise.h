@@ -32,18 +32,18 @@ class Denoiser {
   Denoiser& operator=(const Denoiser&) = delete;
 
   /// Denoises `rgb` (linear, 3 channels, high dynamic range) on the CPU. `albedo` in [0, 1] and `normal` in [-1, 1] are
-  /// guides that preserve texture and edges: 3 channels, the same size, or null; the normal only together with the
-  /// albedo. They may be noisy unless `clean_guides` is set. Values of `rgb` that cannot be used are replaced first
-  /// (filters/stray_values.h), those of guides that are not finite set to zero. Throws
+  /// features that preserve texture and edges: 3 channels, the same size, or null; the normal only together with the
+  /// albedo. They may be noisy unless `clean_features` is set. Values of `rgb` that cannot be used are replaced first
+  /// (filters/stray_values.h), those of features that are not finite set to zero. Throws
   /// Error(kInput) if sizes differ, and Error(kIo) if the library fails. Inside run_stoppable() it returns at once when
   /// stopped; the library's own work ends in the background at its next step (core/detached_work.h).
-  Image denoise(Image rgb, const Image* albedo, const Image* normal, bool clean_guides = false);
-  /// The same without copies of guides whose values are finite; the library may hold them after it was stopped.
+  Image denoise(Image rgb, const Image* albedo, const Image* normal, bool clean_features = false);
+  /// The same without copies of features whose values are finite; the library may hold them after it was stopped.
   Image denoise(Image rgb, std::shared_ptr<const Image> albedo, std::shared_ptr<const Image> normal,
-                bool clean_guides = false);
-  /// Prefilters a guide for use with `clean_guides`. `name`: "albedo" or "normal".
-  Image denoise_guide(const std::string& name, const Image& guide);
-  /// Number of images and guides denoised so far.
+                bool clean_features = false);
+  /// Prefilters a feature for use with `clean_features`. `name`: "albedo" or "normal".
+  Image denoise_feature(const std::string& name, const Image& feature);
+  /// Number of images and features denoised so far.
   int runs() const { return runs_; }
 
  private:
@@ -51,9 +51,9 @@ class Denoiser {
   int runs_ = 0;
 };
 
-/// Throws Error(kInput) if a guide has a non-finite value, which would spread over the image. `name` is for the
+/// Throws Error(kInput) if a feature has a non-finite value, which would spread over the image. `name` is for the
 /// message.
-void check_guide(const std::string& name, const Image& guide);
+void check_feature(const std::string& name, const Image& feature);
 
 /// A single call of Denoiser::denoise().
 Image denoise(const Image& rgb, const Image* albedo, const Image* normal, const DenoiseOptions& options = {});

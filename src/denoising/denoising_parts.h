@@ -35,7 +35,7 @@ struct DenoisingParts {
   bool is_mean = false;
   std::string name = "mean";  ///< of the image
   GroupedImage groups;        ///< the independent samples; the caller owns the memory
-  Guides guides;              ///< identify pixels that see mirrors or glass; the caller owns the memory
+  Features features;          ///< identify pixels that see mirrors or glass; the caller owns the memory
 };
 
 /// The mean of each pixel, 3 channels.

@@ -96,10 +96,10 @@ TEST(Layers, OfACandidateThatConsistsOfOthersAddUpWithoutHelp) {
   const Scene scene;
   Image albedo(kWidth, kHeight, 3);
   std::fill(albedo.data.begin(), albedo.data.end(), 0.5f);
-  Guides guides;
-  guides.albedo = &albedo;
-  std::vector<CandidateMaker> makers = {filtered_candidates(guides, CandidateBase::kMean, FilterKinds::kAll)};
-  add_weighing_maker(guides, makers);
+  Features features;
+  features.albedo = &albedo;
+  std::vector<CandidateMaker> makers = {filtered_candidates(features, CandidateBase::kMean, FilterKinds::kAll)};
+  add_weighing_maker(features, makers);
   ASSERT_EQ(makers.size(), 2u);
   std::vector<Layer> layers = scene.layers();
   for (Layer& layer : layers) layer.sum = Layer::kNoSum;  // they are not made to add up

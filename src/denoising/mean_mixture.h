@@ -14,7 +14,7 @@ namespace covary {
 
 struct MeanMixture {
   GroupedImage independent;  ///< of two groups or more, and kFewestMixedSamples samples or more in each pixel
-  Guides guides;
+  Features features;
   FilterKinds kinds = FilterKinds::kRegression;
   PartsWeighting weighting;
   /// A network's images, whose candidates come first: of all samples and of both halves; empty: without one.

@@ -175,27 +175,27 @@ MixedDenoising single_candidate(const GroupedImage& independent, const std::vect
 /// Shared by the image and its stages; `stages`: candidates and weights are wanted.
 using Run = std::function<MixedDenoising(const Samples& samples, const MethodSettings& settings, bool stages)>;
 
-/// denoise_by_mixture(), with the frame's guides applied to the history and kept for the next frame.
+/// denoise_by_mixture(), with the frame's features applied to the history and kept for the next frame.
 MixedDenoising denoise_frame(DenoisingParts parts, const std::vector<CandidateMaker>& makers,
                              const MixedDenoisingOptions& options, const MethodSettings& settings,
                              std::span<const Layer> layers) {
-  const Image *const albedo = settings.guides.albedo, *const normal = settings.guides.normal;
-  const bool has_guides = albedo && normal;
+  const Image *const albedo = settings.features.albedo, *const normal = settings.features.normal;
+  const bool has_features = albedo && normal;
   MixingHistory history = options.history;
-  if (history.before && has_guides) {
+  if (history.before && has_features) {
     const auto before = std::make_shared<History>(*history.before);
     follow_features(*before, *albedo, *normal);
     history.before = before;
   }
-  parts.guides = settings.guides;
+  parts.features = settings.features;
   MixedDenoising out = denoise_by_mixture(std::move(parts), makers, options.mode, settings.std_error, layers, history);
-  if (history.keep_samples && has_guides) out.result.kept_samples[2] = *albedo, out.result.kept_samples[3] = *normal;
+  if (history.keep_samples && has_features) out.result.kept_samples[2] = *albedo, out.result.kept_samples[3] = *normal;
   return out;
 }
 
 Run run_of_pair(const Method& base, const MixedDenoisingOptions& options, bool with_oidn) {
   return [=](const Samples& samples, const MethodSettings& settings, bool /*stages*/) {
-    check_guides(settings.guides);
+    check_features(settings.features);
     const auto& [crn, independent] = samples;
     if (std::min(crn.groups, independent.groups) < 2 * base.fewest_groups) {
       MixedDenoising out;
@@ -205,8 +205,8 @@ Run run_of_pair(const Method& base, const MixedDenoisingOptions& options, bool w
                       2 * base.fewest_groups, base.text);
       return out;
     }
-    std::vector<CandidateMaker> makers = {filtered_candidates(settings.guides)};
-    if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn));
+    std::vector<CandidateMaker> makers = {filtered_candidates(settings.features)};
+    if (with_oidn) makers.push_back(neural_candidates(settings.features, options.oidn));
     return denoise_frame(parts_of_pair(base, crn, independent, settings), makers, options, settings, {});
   };
 }
@@ -216,14 +216,14 @@ constexpr const char* kMixedHere = "layers, history and pictures of very few sam
 Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
   return [=](const Samples& samples, const MethodSettings& settings, bool stages) {
     const GroupedImage& independent = samples.independent;
-    check_guides(settings.guides);
+    check_features(settings.features);
     const FilterKinds kinds = kinds_of_mean(with_oidn);
     const auto here = [&]() -> MixedDenoising {
       std::vector<CandidateMaker> makers;
-      if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn, CandidateBase::kMean));
-      makers.push_back(filtered_candidates(settings.guides, CandidateBase::kMean, kinds));
+      if (with_oidn) makers.push_back(neural_candidates(settings.features, options.oidn, CandidateBase::kMean));
+      makers.push_back(filtered_candidates(settings.features, CandidateBase::kMean, kinds));
       if (!can_be_mixed(independent)) return single_candidate(independent, makers, settings.layers);
-      add_weighing_maker(settings.guides, makers);
+      add_weighing_maker(settings.features, makers);
       return denoise_frame(parts_of_mean(independent), makers, options, settings, settings.layers);
     };
     if (!options.mix_mean) return here();
@@ -233,11 +233,11 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
       out.result.note += out.result.note.empty() ? kMixedHere : fmt::format("; {}", kMixedHere);
       return out;
     }
-    MeanMixture request{independent, settings.guides,    kinds, settings_of(options.mode).weighting,
+    MeanMixture request{independent, settings.features,  kinds, settings_of(options.mode).weighting,
                         {},          settings.std_error, stages};
     if (with_oidn)
       request.network = [&](std::array<Image, 3> noisy) {
-        return network_images(settings.guides, options.oidn, std::move(noisy));
+        return network_images(settings.features, options.oidn, std::move(noisy));
       };
     return options.mix_mean(request, here);
   };
@@ -249,11 +249,11 @@ RowsMethod rows_of_mean(bool with_oidn) {
   method.reach_of_parts = kMeanReach;
   method.parts = [](const Samples& rows, const MethodSettings& settings) {
     DenoisingParts parts = parts_of_mean(rows.independent);
-    parts.guides = settings.guides;
+    parts.features = settings.features;
     return parts;
   };
-  method.filters = [with_oidn](const Guides& guides, int first_row) {
-    return filtered_candidates(guides, CandidateBase::kMean, kinds_of_mean(with_oidn), first_row);
+  method.filters = [with_oidn](const Features& features, int first_row) {
+    return filtered_candidates(features, CandidateBase::kMean, kinds_of_mean(with_oidn), first_row);
   };
   method.are_enough = [](const Samples& rows) { return can_be_mixed(rows.independent); };
   method.of_few = [](const Samples& rows, const MethodSettings&, const std::vector<CandidateMaker>& makers) {
@@ -268,11 +268,11 @@ RowsMethod rows_of_pair(const Method& base) {
   method.reach_of_parts = base.reach + kFilledReach;
   method.parts = [base](const Samples& rows, const MethodSettings& settings) {
     DenoisingParts parts = parts_of_pair(base, rows.crn, rows.independent, settings);
-    parts.guides = settings.guides;
+    parts.features = settings.features;
     return parts;
   };
-  method.filters = [](const Guides& guides, int first_row) {
-    return filtered_candidates(guides, CandidateBase::kPair, FilterKinds::kNlMeans, first_row);
+  method.filters = [](const Features& features, int first_row) {
+    return filtered_candidates(features, CandidateBase::kPair, FilterKinds::kNlMeans, first_row);
   };
   method.are_enough = [n = 2 * base.fewest_groups](const Samples& rows) {
     return std::min(rows.crn.groups, rows.independent.groups) >= n;
@@ -294,7 +294,7 @@ void allow_rows(const Method& base, const MixedDenoisingOptions& options, bool w
   method.reach = rows_reach(rows);
   method.memory.of_whole = bytes_of_whole(with_oidn);
   method.image_in_rows = [rows](const SamplesInRows& image, const MethodSettings& settings) {
-    check_guides(settings.guides);
+    check_features(settings.features);
     return denoise_in_rows(image, settings, rows);
   };
 }
@@ -353,7 +353,7 @@ Method with_denoising(const Method& base, const MixedDenoisingOptions& options) 
                 fmt::format(" --denoise {}{}", settings_of(options.mode).name, with_oidn ? "" : " --oidn off");
   if (with_oidn) method.network = "Open Image Denoise " + denoiser_info(options.oidn).version;  // or throws
   method.fewest_groups = base.is_mean() ? 1 : 2 * base.fewest_groups;
-  method.predicts_error = method.reads_guides = true;
+  method.predicts_error = method.reads_features = true;
   method.reliable_samples = base.reliable_samples;
   method.memory = base.memory;
   method.memory.always += with_oidn ? kBytesWithOidn : kBytesPerPixel + (base.is_mean() ? kBytesOfMean : 0);

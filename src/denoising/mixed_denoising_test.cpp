@@ -44,10 +44,10 @@ Method denoiser(DenoiseMode mode) {
   return with_denoising(make_estimator("iicv"), options);
 }
 
-MethodImage denoised(const Inputs& in, DenoiseMode mode, const Guides& guides = {}) {
+MethodImage denoised(const Inputs& in, DenoiseMode mode, const Features& features = {}) {
   MethodSettings settings;
   settings.std_error = true;
-  settings.guides = guides;
+  settings.features = features;
   return denoiser(mode).image({in.crn.view(), in.independent.view()}, settings);
 }
 
@@ -96,10 +96,10 @@ Method mean_denoiser(DenoiseMode mode) {
   return with_denoising(make_estimator("none"), options);
 }
 
-MethodImage denoised_mean(const test::Grouped& image, DenoiseMode mode, const Guides& guides = {}) {
+MethodImage denoised_mean(const test::Grouped& image, DenoiseMode mode, const Features& features = {}) {
   MethodSettings settings;
   settings.std_error = true;
-  settings.guides = guides;
+  settings.features = features;
   return mean_denoiser(mode).image({{}, image.view()}, settings);
 }
 
@@ -142,7 +142,7 @@ TEST(MixedDenoising, OfASinglePassWeighsTheCandidatesOfAllFilters) {
   Image albedo(kWidth, kHeight, 3);
   std::fill(albedo.data.begin(), albedo.data.end(), 0.5f);
   MethodSettings settings;
-  settings.guides.albedo = &albedo;
+  settings.features.albedo = &albedo;
   const std::map<std::string, Image> stages =
       mean_denoiser(DenoiseMode::kAuto).stages({{}, in.independent.view()}, settings);
   for (const char* name : {"regression", "sharp", "smooth", "demodulated", "weighed"})
@@ -247,7 +247,7 @@ TEST(MixedDenoising, ResidualGivesBackWhatPixelsAlikeLack) {
   EXPECT_LT(square_error(corrected, scale), 0.2 * square_error(dark, scale));
 }
 
-TEST(MixedDenoising, UsesGuides) {
+TEST(MixedDenoising, UsesFeatures) {
   const Inputs in(2);
   Image albedo(kWidth, kHeight, 3), normal(kWidth, kHeight, 3);
   for (int y = 0; y < kHeight; ++y)
@@ -261,15 +261,15 @@ TEST(MixedDenoising, UsesGuides) {
   EXPECT_LT(square_error(guided.estimate), 0.8 * square_error(iicv_of(in)));
 }
 
-TEST(MixedDenoising, GivesTheNetworkGuidesBehindGlass) {
+TEST(MixedDenoising, GivesTheNetworkFeaturesBehindGlass) {
   const Image images[4];
-  const Guides first{&images[0], &images[1], nullptr, nullptr}, all{&images[0], &images[1], &images[2], &images[3]};
-  EXPECT_EQ(network_guides(first).albedo, &images[0]);
-  EXPECT_EQ(network_guides(first).normal, &images[1]);
-  EXPECT_EQ(network_guides(all).albedo, &images[2]);
-  EXPECT_EQ(network_guides(all).normal, &images[3]);
-  const Guides half{&images[0], &images[1], &images[2], nullptr};
-  EXPECT_EQ(network_guides(half).albedo, &images[0]) << "both of the same surface";
+  const Features first{&images[0], &images[1], nullptr, nullptr}, all{&images[0], &images[1], &images[2], &images[3]};
+  EXPECT_EQ(network_features(first).albedo, &images[0]);
+  EXPECT_EQ(network_features(first).normal, &images[1]);
+  EXPECT_EQ(network_features(all).albedo, &images[2]);
+  EXPECT_EQ(network_features(all).normal, &images[3]);
+  const Features half{&images[0], &images[1], &images[2], nullptr};
+  EXPECT_EQ(network_features(half).albedo, &images[0]) << "both of the same surface";
 }
 
 /// Frames of a static scene and a denoiser that changes nothing: the error falls with the number of frames.

@@ -90,7 +90,7 @@ MixedRows mixed_rows(const DenoisingParts& parts, const MixedParts& mixed, const
   rows.result.bias =
       held_out_bias({images, {&guide_of(mixed.halves[0]), &guide_of(mixed.halves[1])}, independent, &valid});
   rows.result.risk_rows = image_risk(
-      {&mixture.image, images, &parts.whole.independent, independent, &parts.groups, &guide, &valid, parts.guides});
+      {&mixture.image, images, &parts.whole.independent, independent, &parts.groups, &guide, &valid, parts.features});
   rows.of_base = rows_of_base(parts, guide);
   for (size_t p = 0; p < mixed.whole.candidates.size(); ++p) {
     held_out.halves = {&mixed.halves[0].candidates[p], &mixed.halves[1].candidates[p]};

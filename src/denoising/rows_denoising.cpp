@@ -18,31 +18,31 @@ namespace {
 
 static_assert(kBandCell % kResidualCell == 0 && kBandCell % kRegressionCell == 0 && kBandCell % kWeighingRows == 0);
 
-/// Rows of the guides.
-struct GuideRows {
+/// Rows of the features.
+struct FeatureRows {
   std::array<std::optional<Image>, 5> images;
-  Guides guides;
+  Features features;
 
-  GuideRows(const Guides& whole, int first, int n) {
+  FeatureRows(const Features& whole, int first, int n) {
     const std::array<std::pair<const Image*, const Image**>, 5> all = {
-        {{whole.albedo, &guides.albedo},
-         {whole.normal, &guides.normal},
-         {whole.denoising_albedo, &guides.denoising_albedo},
-         {whole.denoising_normal, &guides.denoising_normal},
-         {whole.position, &guides.position}}};
+        {{whole.albedo, &features.albedo},
+         {whole.normal, &features.normal},
+         {whole.denoising_albedo, &features.denoising_albedo},
+         {whole.denoising_normal, &features.denoising_normal},
+         {whole.position, &features.position}}};
     for (size_t i = 0; i < all.size(); ++i)
       if (all[i].first) *all[i].second = &images[i].emplace(rows_of(*all[i].first, first, n));
-    guides.clean = whole.clean;
+    features.clean = whole.clean;
   }
-  GuideRows(const GuideRows&) = delete;
-  GuideRows& operator=(const GuideRows&) = delete;
+  FeatureRows(const FeatureRows&) = delete;
+  FeatureRows& operator=(const FeatureRows&) = delete;
 };
 
 /// Rows first … of the image, which hold the rows that are wanted from row `skipped` on.
 struct Band {
   int first = 0, skipped = 0;
   Samples rows;
-  GuideRows guides;
+  FeatureRows features;
   MethodSettings settings;
 };
 
@@ -88,8 +88,8 @@ class RowsDenoising {
       const int n = std::min(step, end - y);
       const int begin = std::max(0, y - reach) / kBandCell * kBandCell;
       const int rows = std::min(image_.height, y + n + reach) - begin;
-      Band band{begin, y - begin, image_.rows(begin, rows), GuideRows(settings_.guides, begin, rows), settings_};
-      band.settings.guides = band.guides.guides;
+      Band band{begin, y - begin, image_.rows(begin, rows), FeatureRows(settings_.features, begin, rows), settings_};
+      band.settings.features = band.features.features;
       f(band, y, n);
     }
   }
@@ -131,14 +131,14 @@ class RowsDenoising {
       const std::array<Image, 3> rows = noisy_rows(band);
       for (size_t i = 0; i < rows.size(); ++i) copy_rows(rows[i], band.skipped, y, n, image_.height, noisy[i]);
     });
-    network_ = std::make_shared<NetworkImages>(network_images(settings_.guides, *method_.network, std::move(noisy)));
+    network_ = std::make_shared<NetworkImages>(network_images(settings_.features, *method_.network, std::move(noisy)));
   }
 
   std::vector<CandidateMaker> makers_of(const Band& band) const {
-    std::vector<CandidateMaker> makers = {method_.filters(band.guides.guides, band.first)};
+    std::vector<CandidateMaker> makers = {method_.filters(band.features.features, band.first)};
     const bool is_mean = method_.base == CandidateBase::kMean;
     if (!network_) {
-      if (is_mean && enough_) add_weighing_maker(band.guides.guides, makers);
+      if (is_mean && enough_) add_weighing_maker(band.features.features, makers);
       return makers;
     }
     const auto rows = std::make_shared<NetworkImages>();
@@ -203,7 +203,7 @@ int rows_reach(const RowsMethod& method) {
 double bytes_of_whole(bool with_network) {
   constexpr double kImage = 3 * sizeof(float), kPlane = sizeof(float);
   // Weights and disagreement. With a network its three images, and while it runs, before there is a result of three
-  // images, its guides, mirrored ones and an image.
+  // images, its features, mirrored ones and an image.
   return with_network ? (3 + 5 - 3) * kImage : 2 * kPlane;
 }
 

@@ -22,7 +22,7 @@ struct RowsMethod {
   CandidateBase base = CandidateBase::kMean;
   int reach_of_parts = 0;  ///< radius of influence of the images on the parts
   std::function<DenoisingParts(const Samples& rows, const MethodSettings& settings)> parts;
-  std::function<CandidateMaker(const Guides& guides, int first_row)> filters;
+  std::function<CandidateMaker(const Features& features, int first_row)> filters;
   std::optional<DenoiseOptions> network;
   /// The image of rows whose samples are too few for a mixture.
   std::function<MethodImage(const Samples& rows, const MethodSettings& settings,

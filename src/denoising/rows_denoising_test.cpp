@@ -39,10 +39,10 @@ struct Scene {
       independent.pixel(9, y)[4] = std::numeric_limits<float>::quiet_NaN();
   }
 
-  MethodSettings settings(bool with_guides) const {
+  MethodSettings settings(bool with_features) const {
     MethodSettings settings;
     settings.std_error = true;
-    if (with_guides) settings.guides = {&albedo, &normal, nullptr, nullptr, &position};
+    if (with_features) settings.features = {&albedo, &normal, nullptr, nullptr, &position};
     return settings;
   }
 };
@@ -69,10 +69,10 @@ void expect_equal(const MethodImage& rows, const MethodImage& whole, const std::
 }
 
 /// `spare`: rows of a band beside those around it.
-void check(const Method& estimator, const Scene& scene, bool with_guides, int spare, const std::string& what) {
+void check(const Method& estimator, const Scene& scene, bool with_features, int spare, const std::string& what) {
   const bool is_pair = estimator.pair();
   const GroupedImage crn = is_pair ? scene.crn.view() : GroupedImage(), independent = scene.independent.view();
-  const MethodSettings settings = scene.settings(with_guides);
+  const MethodSettings settings = scene.settings(with_features);
   ASSERT_TRUE(estimator.image_in_rows) << what;
   ASSERT_GT(scene.height, 2 * estimator.reach + spare) << what << ": there is more than one band";
   int most = 0;
@@ -97,8 +97,8 @@ TEST(RowsDenoising, OfAMeanHaveTheBitsOfTheWhole) {
   const Scene scene(451, 4);
   const Method estimator = denoiser("none", DenoiseMode::kAuto);
   for (const int spare : {48, 60, 90}) {
-    check(estimator, scene, false, spare, "without guides");
-    check(estimator, scene, true, spare, "with guides");
+    check(estimator, scene, false, spare, "without features");
+    check(estimator, scene, true, spare, "with features");
   }
 }
 
@@ -132,8 +132,8 @@ TEST(RowsDenoising, WithTheNetworkHaveTheBitsOfTheWhole) {
   }
   const Scene scene(451, 4);
   const Method of_mean = denoiser("none", DenoiseMode::kAuto, true);
-  check(of_mean, scene, true, 48, "a mean with guides");
-  check(of_mean, scene, false, 60, "a mean without guides");
+  check(of_mean, scene, true, 48, "a mean with features");
+  check(of_mean, scene, false, 60, "a mean without features");
   check(denoiser("iicv", DenoiseMode::kAuto, true), Scene(601, 6), true, 60, "a pair");
 }
 

@@ -6,13 +6,13 @@
 
 namespace covary {
 
-void add_weighing_maker(const Guides& guides, std::vector<CandidateMaker>& makers) {
+void add_weighing_maker(const Features& features, std::vector<CandidateMaker>& makers) {
   const WeighingNetwork* const network = WeighingNetwork::find(names_of(makers));
   if (!network) return;
-  WeighingGuides seen;
-  if (guides.albedo && guides.normal) {
-    const Guides second = network_guides(guides);
-    seen = {guides.albedo, guides.normal, second.albedo, second.normal};
+  WeighingSurfaces seen;
+  if (features.albedo && features.normal) {
+    const Features second = network_features(features);
+    seen = {features.albedo, features.normal, second.albedo, second.normal};
   }
   CandidateMaker maker;
   maker.names = {kWeighedName};

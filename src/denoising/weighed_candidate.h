@@ -11,8 +11,8 @@ namespace covary {
 
 inline constexpr const char* kWeighedName = "weighed";
 
-/// Adds its maker to those of a mean's candidates, if there is a network for these. The guides must outlive it.
-void add_weighing_maker(const Guides& guides, std::vector<CandidateMaker>& makers);
+/// Adds its maker to those of a mean's candidates, if there is a network for these. The features must outlive it.
+void add_weighing_maker(const Features& features, std::vector<CandidateMaker>& makers);
 
 /// Adds the candidate that this maker makes of the others.
 void add_weighed(const CandidateMaker& maker, const CandidateInput& input, CandidateSet& set);

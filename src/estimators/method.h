@@ -23,7 +23,7 @@ namespace covary {
 
 /// Auxiliary images of the surfaces behind the pixels: three channels, of the image's size. Null if unknown; a normal
 /// is given only together with an albedo.
-struct Guides {
+struct Features {
   const Image* albedo = nullptr;  ///< reflectance, in [0, 1]
   const Image* normal = nullptr;  ///< in [-1, 1]
   /// Same, but of what is seen through mirrors and glass, tinted by them; null: use those above.
@@ -46,7 +46,7 @@ struct MethodSettings {
   int64_t crn_samples = 1;  ///< samples per pixel of the CRN image, > 0; used if PassPair::needs_sample_count
   bool std_error = false;   ///< also estimate the standard error; used if Method::predicts_error
   bool held_out = true;     ///< with the standard error: also what held-out samples tell of it
-  Guides guides;            ///< used if Method::reads_guides
+  Features features;        ///< used if Method::reads_features
   /// Layers that sum to the independent image, and others; used if Method::splits_layers().
   std::span<const Layer> layers;
 };
@@ -133,11 +133,11 @@ struct Method {
   bool holds_out = false;
   /// Samples per pixel, over all passes, below which the predicted error was found to be unreliable.
   uint32_t reliable_samples = 0;
-  bool reads_guides = false;  ///< whether it uses MethodSettings::guides
+  bool reads_features = false;  ///< whether it uses MethodSettings::features
 
   int reach = 0;  ///< extra rows on each side that a band of rows needs; -1: needs the whole image
   /// The image of all rows, with the same bits, for methods whose bands share more than pixels; otherwise empty.
-  /// Without layers; guides are those of the whole image.
+  /// Without layers; features are those of the whole image.
   std::function<MethodImage(const SamplesInRows& samples, const MethodSettings& settings)> image_in_rows;
   MethodMemory memory;
   /// Images of intermediate steps by name, for output; an empty function if the method has none.

@@ -16,7 +16,7 @@ TEST(DenoisedBy, IsToldByAttributesAndLayers) {
   EXPECT_EQ(denoised_by({{"covary:denoiser", "Open Image Denoise 2.5.1"}}, {}), "Open Image Denoise 2.5.1");
   std::vector<ExrFile::Channel> channels(2);
   channels[0].name = "ViewLayer.Combined.R", channels[1].name = "ViewLayer.Denoising Albedo.R";
-  EXPECT_EQ(denoised_by({}, channels), "") << "guides alone";
+  EXPECT_EQ(denoised_by({}, channels), "") << "features alone";
   channels[1].name = "ViewLayer.Noisy Image.R";
   EXPECT_NE(denoised_by({}, channels).find("Cycles"), std::string::npos);
   EXPECT_NE(denoised_by({}, channels, "ViewLayer.Combined"), "");

@@ -16,7 +16,7 @@ namespace covary {
 namespace film_key {
 inline constexpr const char* kPredicted = "predicted_relmse";
 inline constexpr const char* kPredictedBounds = "predicted_relmse_80";
-inline constexpr const char* kCleanGuides = "clean_guides";  ///< "true": the auxiliary images are nearly noise-free
+inline constexpr const char* kCleanFeatures = "clean_features";  ///< "true": the auxiliary images are nearly noise-free
 }  // namespace film_key
 
 /// kPredictedBounds of a file; empty if it has none.

@@ -82,7 +82,7 @@ TEST(Pictures, ThatAreNotThereAreToldWithThoseThatAre) {
             "right.G right.B)");
 }
 
-TEST(Pictures, HaveTheirOwnGuides) {
+TEST(Pictures, HaveTheirOwnFeatures) {
   const Channels channels = layers({"left", "right", "left.albedo", "right.albedo", "albedo"}, {"left", "right"});
   const Picture left = chosen_pictures("f", channels, {"", "left"})[0];
   EXPECT_TRUE(belongs_to(left, "left.albedo", channels));

@@ -12,13 +12,13 @@ namespace {
 
 constexpr int kRadius = 8;
 constexpr float kSpatial = 4, kAlbedo = 0.1f, kNormal = 0.3f;  // standard deviations
-constexpr int kGuides = 6, kFinite = 9, kCount = 10;           // planes: guides, RGB, 1 or 0: whether RGB is finite
+constexpr int kFeatures = 6, kFinite = 9, kCount = 10;         // planes: features, RGB, 1 or 0: whether RGB is finite
 
 bool same_size(const Image& a, const Image& b) {
   return a.width == b.width && a.height == b.height && a.channels == 3 && b.channels == 3;
 }
 
-/// The guides, scaled such that a distance d has weight 2^(-d²), and the image; zeros outside.
+/// The features, scaled such that a distance d has weight 2^(-d²), and the image; zeros outside.
 Planes planes_of(const Image& rgb, const Image& albedo, const Image& normal) {
   Planes planes(rgb.width, rgb.height, kCount, kRadius, 0);
   const auto unit = [](float deviation) { return std::sqrt(0.5f * lanes::kLog2E) / deviation; };
@@ -29,7 +29,7 @@ Planes planes_of(const Image& rgb, const Image& albedo, const Image& normal) {
       for (int c = 0; c < 3; ++c) {
         planes.row(c, y)[x] = albedo.pixel(x, y)[c] * unit(kAlbedo);
         planes.row(3 + c, y)[x] = normal.pixel(x, y)[c] * unit(kNormal);
-        planes.row(kGuides + c, y)[x] = finite ? value[c] : 0;
+        planes.row(kFeatures + c, y)[x] = finite ? value[c] : 0;
       }
       planes.row(kFinite, y)[x] = finite ? 1 : 0;
     }
@@ -45,19 +45,19 @@ Image joint_bilateral(const Image& rgb, const Image& albedo, const Image& normal
   const Planes planes = planes_of(rgb, albedo, normal);
   Image result(rgb.width, rgb.height, 3);
   for_each_batch(rgb.width, rgb.height, [&](int x, int y, int n) {
-    lanes::vfloat own[kGuides], sum[kCount - kGuides] = {};
-    for (int c = 0; c < kGuides; ++c) own[c] = lanes::load(planes.row(c, y) + x);
+    lanes::vfloat own[kFeatures], sum[kCount - kFeatures] = {};
+    for (int c = 0; c < kFeatures; ++c) own[c] = lanes::load(planes.row(c, y) + x);
     for (int dy = -kRadius; dy <= kRadius; ++dy)
       for (int dx = -kRadius; dx <= kRadius; ++dx) {
         const auto at = [&](int c) { return lanes::load(planes.row(c, y + dy) + x + dx); };
         lanes::vfloat exponent =
             lanes::splat(static_cast<float>(dx * dx + dy * dy) * (-0.5f * lanes::kLog2E / sqr(kSpatial)));
-        for (int c = 0; c < kGuides; ++c) {
+        for (int c = 0; c < kFeatures; ++c) {
           const lanes::vfloat difference = own[c] - at(c);
           exponent = lanes::fnma(difference, difference, exponent);
         }
         const lanes::vfloat weight = lanes::exp2_of_nonpositive(exponent) * at(kFinite);
-        for (int c = 0; c < 3; ++c) sum[c] = lanes::fma(weight, at(kGuides + c), sum[c]);
+        for (int c = 0; c < 3; ++c) sum[c] = lanes::fma(weight, at(kFeatures + c), sum[c]);
         sum[3] += weight;
       }
     for (int c = 0; c < 3; ++c)

@@ -29,7 +29,7 @@ Image constant(float value) {
   return image([value](int, int) { return value; });
 }
 
-TEST(JointBilateral, SmoothsNoiseWhereGuidesAreFlat) {
+TEST(JointBilateral, SmoothsNoiseWhereFeaturesAreFlat) {
   const Image result = joint_bilateral(image(noise), constant(0.5f), constant(0));
   for (int y = 0; y < kSide; ++y)
     for (int x = 0; x < kSide; ++x) EXPECT_NEAR(result.pixel(x, y)[1], 0.5f, 0.15f);

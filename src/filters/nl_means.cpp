@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tiles of the image are processed in parallel; within a tile, bands of rows from top to bottom, and within a band a
 // few offsets o = j - i at a time. All inner loops run along rows. A pixel pair (p, p + o) gives the weight of p + o
-// for p, `forward`, and of p for p + o, `backward`: both have the same guide distance and the same quotient. So half of
-// all offsets suffice, if pairs that reach into the tile from outside are included. Patch distances are summed over
+// for p, `forward`, and of p for p + o, `backward`: both have the same feature distance and the same quotient. So half
+// of all offsets suffice, if pairs that reach into the tile from outside are included. Patch distances are summed over
 // rows of three pixels, then over three rows, of which the last two are kept. Weights are not kept beyond a row.
 #include "filters/nl_means.h"
 
@@ -103,14 +103,14 @@ struct Steering {
 
 class Filter {
  public:
-  Filter(std::span<const NlMeansSteering> steerings, const Planes* guides, const std::vector<unsigned char>& valid,
+  Filter(std::span<const NlMeansSteering> steerings, const Planes* features, const std::vector<unsigned char>& valid,
          int first_row)
       : width_(steerings[0].image->width),
         height_(steerings[0].image->height),
         first_row_(first_row),
-        guides_(guides),
+        features_(features),
         valid_(valid) {
-    COVARY_CHECK(!guides_ || guides_->border() >= kNlMeansRadius, "guides have the border that NL-means reads");
+    COVARY_CHECK(!features_ || features_->border() >= kNlMeansRadius, "features have the border that NL-means reads");
     for (const NlMeansSteering& given : steerings) add_steering(given);
     images_.resize(results_.size(), Image(width_, height_, 3));
   }
@@ -137,12 +137,12 @@ class Filter {
   using Rows = std::array<Row, kAtOnce>;  // one per offset
   /// Scratch for kAtOnce offsets at a time.
   struct Buffers {
-    std::vector<Planes> planes;                     // per steering
-    Planes mask;                                    // 1 at valid pixels, 0 elsewhere and outside
-    std::array<std::array<Rows, 2>, kBand> guides;  // exp(-||q_p - q_(p + o)||^2), for valid p + o, and for valid p
-    std::array<std::array<Rows, 2>, 2> pair_sums;   // A and B, summed over three pixels; for even and odd rows
-    std::vector<std::array<Rows, 2>> weights;       // per task, forward and backward
-    std::vector<float> totals;                      // per row of the tile
+    std::vector<Planes> planes;                       // per steering
+    Planes mask;                                      // 1 at valid pixels, 0 elsewhere and outside
+    std::array<std::array<Rows, 2>, kBand> features;  // exp(-||q_p - q_(p + o)||^2), for valid p + o, and for valid p
+    std::array<std::array<Rows, 2>, 2> pair_sums;     // A and B, summed over three pixels; for even and odd rows
+    std::vector<std::array<Rows, 2>> weights;         // per task, forward and backward
+    std::vector<float> totals;                        // per row of the tile
   };
   struct Result {
     size_t total;
@@ -235,7 +235,7 @@ class Filter {
   /// Adds the contributions of the pairs of rows `first` to `end` - 1 to both of their pixels.
   void add_pairs(const Tile& tile, int first, int end, const Offsets& o, Buffers& b) const {
     for (int y = first; y < end; ++y)
-      for (int k = 0; k < o.n; ++k) find_guide_likenesses(tile, y, o.dx + k, o.dy, k, b.guides[y - first], b);
+      for (int k = 0; k < o.n; ++k) find_feature_likenesses(tile, y, o.dx + k, o.dy, k, b.features[y - first], b);
     for (size_t i = 0; i < steerings_.size(); ++i)
       for (int y = first - kPatch; y < end + kPatch; ++y) {
         const int row = y - kPatch;  // this row completes its patches
@@ -243,24 +243,24 @@ class Filter {
           if (row < first)
             find_weights<false>(i, tile, y, o.dx + k, o.dy, k, nullptr, b);
           else
-            find_weights<true>(i, tile, y, o.dx + k, o.dy, k, b.guides[row - first].data(), b);
+            find_weights<true>(i, tile, y, o.dx + k, o.dy, k, b.features[row - first].data(), b);
         if (row < first) continue;
         if (row >= 0) add_row(i, tile, row + o.dy, o, 1, totals(b, row), b);
         if (row + o.dy < tile.height) add_row(i, tile, row, o, -1, totals(b, row + o.dy), b);
       }
   }
 
-  void find_guide_likenesses(const Tile& tile, int y, int dx, int dy, int k, std::array<Rows, 2>& likenesses,
-                             const Buffers& b) const {
-    const int left = tile.left(dx), n = tile.n_pairs(dx), count = guides_ ? guides_->count() : 0;
-    const float* const guides = guides_ ? guides_->row(0, tile.y + y) + tile.x + left : nullptr;
-    const ptrdiff_t plane = count > 1 ? guides_->row(1, 0) - guides_->row(0, 0) : 0;
-    const ptrdiff_t there = guides_ ? dy * guides_->stride() + dx : 0;
+  void find_feature_likenesses(const Tile& tile, int y, int dx, int dy, int k, std::array<Rows, 2>& likenesses,
+                               const Buffers& b) const {
+    const int left = tile.left(dx), n = tile.n_pairs(dx), count = features_ ? features_->count() : 0;
+    const float* const features = features_ ? features_->row(0, tile.y + y) + tile.x + left : nullptr;
+    const ptrdiff_t plane = count > 1 ? features_->row(1, 0) - features_->row(0, 0) : 0;
+    const ptrdiff_t there = features_ ? dy * features_->stride() + dx : 0;
     const float *own_mask = b.mask.row(0, y) + left, *other_mask = b.mask.row(0, y + dy) + left + dx;
     float *forward = likenesses[0][k].begin(), *backward = likenesses[1][k].begin();
     for (int x = 0; x < n; x += kLanes) {
       vfloat sum = {};
-      const float* q = guides + x;
+      const float* q = features + x;
       for (int i = 0; i < count; ++i, q += plane) {
         const vfloat difference = load(q) - load(q + there);
         sum = fma(difference, difference, sum);
@@ -275,13 +275,13 @@ class Filter {
   /// y - 1.
   template <bool with_weights>
   [[gnu::noinline]] void find_weights(size_t steering, const Tile& tile, int y, int dx, int dy, int k,
-                                      const Rows* guides, Buffers& b) const {
+                                      const Rows* features, Buffers& b) const {
     const Planes& planes = b.planes[steering];
     const int left = tile.left(dx), n = tile.n_pairs(dx);
     const ptrdiff_t there = dy * kStride + dx;
     const float *f = planes.row(0, y) + left - kPatch, *variance = planes.row(3, y) + left - kPatch;
-    const float* const guide[] = {with_weights ? guides[0][k].begin() : nullptr,
-                                  with_weights ? guides[1][k].begin() : nullptr};
+    const float* const feature[] = {with_weights ? features[0][k].begin() : nullptr,
+                                    with_weights ? features[1][k].begin() : nullptr};
     float *before[2], *before_that[2], *weights[2];
     for (const int i : {0, 1}) {
       before[i] = b.pair_sums[(y + 1) & 1][i][k].begin();
@@ -298,7 +298,7 @@ class Filter {
       if (next_x < n + 2 * kPatch) next = pixel_sums(f + next_x, variance + next_x, there);
       const vfloat sums[] = {sum_of_three(pixels.a, next.a), sum_of_three(pixels.b, next.b)};
       if constexpr (with_weights) {
-        const vfloat of_guides[] = {load(guide[0] + x), load(guide[1] + x)};
+        const vfloat of_features[] = {load(feature[0] + x), load(feature[1] + x)};
         const vfloat A = load(before_that[0] + x) + load(before[0] + x) + sums[0],
                      B = load(before_that[1] + x) + load(before[1] + x) + sums[1];
         const vfloat distances[] = {A - B, A + (B - kOfPatch)};
@@ -312,7 +312,7 @@ class Filter {
             } else {
               likeness = exp2_of_nonpositive(min(distances[direction] * scales[i], vfloat{}));
             }
-            store(weights[direction] + i * kTask + x, min(likeness, of_guides[direction]));
+            store(weights[direction] + i * kTask + x, min(likeness, of_features[direction]));
           }
       }
       for (const int i : {0, 1}) store(before_that[i] + x, sums[i]);
@@ -381,7 +381,7 @@ class Filter {
   }
 
   const int width_, height_, first_row_;
-  const Planes* guides_;
+  const Planes* features_;
   const std::vector<unsigned char>& valid_;
   std::vector<Steering> steerings_;
   size_t n_totals_ = 0, n_weights_ = 0;
@@ -391,9 +391,9 @@ class Filter {
 
 }  // namespace
 
-std::vector<Image> nl_means(std::span<const NlMeansSteering> steerings, const Planes* guides,
+std::vector<Image> nl_means(std::span<const NlMeansSteering> steerings, const Planes* features,
                             const std::vector<unsigned char>& valid, int first_row) {
-  return Filter(steerings, guides, valid, first_row).run();
+  return Filter(steerings, features, valid, first_row).run();
 }
 
 }  // namespace covary

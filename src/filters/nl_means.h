@@ -36,12 +36,12 @@ inline constexpr int kNlMeansRadius = 10;
 inline constexpr int kNlMeansReach = kNlMeansRadius + 1;
 
 /// The weighted means of all sources of all tasks of all steerings, in this order. Tasks of one steering share their
-/// distances, and all steerings those of the guides, so that further ones cost less. Pixels whose weights are all zero
-/// keep the source's value. All images must have three channels, the same size and finite values. Bit-identical for any
-/// number of threads. `guides`: q, any number of planes, border of at least kNlMeansRadius; may be null. `valid`:
-/// pixels with 0 are left out of all sums. `first_row`: of a larger image if these are rows of it; rows at least
-/// kNlMeansReach away from those that are missing have the bits of the whole.
-std::vector<Image> nl_means(std::span<const NlMeansSteering> steerings, const Planes* guides,
+/// distances, and all steerings those of the features, so that further ones cost less. Pixels whose weights are all
+/// zero keep the source's value. All images must have three channels, the same size and finite values. Bit-identical
+/// for any number of threads. `features`: q, any number of planes, border of at least kNlMeansRadius; may be null.
+/// `valid`: pixels with 0 are left out of all sums. `first_row`: of a larger image if these are rows of it; rows at
+/// least kNlMeansReach away from those that are missing have the bits of the whole.
+std::vector<Image> nl_means(std::span<const NlMeansSteering> steerings, const Planes* features,
                             const std::vector<unsigned char>& valid, int first_row = 0);
 
 }  // namespace covary

@@ -17,10 +17,10 @@ namespace {
 
 struct Picture {
   Image f, s, other;
-  Planes guides;
+  Planes features;
   std::vector<unsigned char> valid;
 
-  Picture(int width, int height) : f(width, height, 3), s(f), other(f), guides(width, height, 2, kNlMeansRadius, 0) {
+  Picture(int width, int height) : f(width, height, 3), s(f), other(f), features(width, height, 2, kNlMeansRadius, 0) {
     valid.assign(static_cast<size_t>(width) * height, 1);
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x) {
@@ -30,12 +30,12 @@ struct Picture {
           f.pixel(x, y)[c] = static_cast<float>(test::expected(x, y, c)) + 0.3f * test::noise(4, pixel, c);
           other.pixel(x, y)[c] = test::noise(5, pixel, c);
         }
-        for (int i : {0, 1}) guides.row(i, y)[x] = test::noise(6, pixel, i);
+        for (int i : {0, 1}) features.row(i, y)[x] = test::noise(6, pixel, i);
       }
   }
   std::vector<Image> filtered(const std::vector<NlMeansTask>& tasks) const {
     const NlMeansSteering steering[] = {{&f, &s, tasks}};
-    return nl_means(steering, &guides, valid);
+    return nl_means(steering, &features, valid);
   }
 };
 
@@ -48,7 +48,7 @@ std::array<double, 3> expected_mean(const Picture& p, const Image& source, int x
     for (int dx = -kNlMeansRadius; dx <= kNlMeansRadius; ++dx) {
       const int qx = x + dx, qy = y + dy;
       if (qx < 0 || qy < 0 || qx >= width || qy >= height || !p.valid[qy * width + qx]) continue;
-      double distance = 0, guide = 0;
+      double distance = 0, feature = 0;
       for (int v = -1; v <= 1; ++v)
         for (int u = -1; u <= 1; ++u)
           for (int c = 0; c < 3; ++c) {
@@ -59,8 +59,8 @@ std::array<double, 3> expected_mean(const Picture& p, const Image& source, int x
             const double own = std::pow(at(p.s, x + u, y + v), 2), other = std::pow(at(p.s, qx + u, qy + v), 2);
             distance += (difference * difference - own - std::min(own, other)) / (own + other + 1e-10) / 27;
           }
-      for (int i : {0, 1}) guide += std::pow(p.guides.row(i, y)[x] - p.guides.row(i, qy)[qx], 2);
-      const double weight = std::exp(-std::max({distance / (bandwidth * bandwidth), guide, 0.0}));
+      for (int i : {0, 1}) feature += std::pow(p.features.row(i, y)[x] - p.features.row(i, qy)[qx], 2);
+      const double weight = std::exp(-std::max({distance / (bandwidth * bandwidth), feature, 0.0}));
       weights += weight;
       for (int c = 0; c < 3; ++c) sum[c] += weight * source.pixel(qx, qy)[c];
     }
@@ -109,9 +109,9 @@ TEST(NlMeans, DoesNotDependOnThreads) {
 TEST(NlMeans, OfSeveralImagesIsThatOfEach) {
   const Picture p(140, 40);
   const NlMeansSteering both[] = {{&p.f, &p.s, {{0.5f, {&p.f}}}}, {&p.other, &p.s, {{1.0f, {&p.other, &p.f}}}}};
-  const std::vector<Image> images = nl_means(both, &p.guides, p.valid);
+  const std::vector<Image> images = nl_means(both, &p.features, p.valid);
   ASSERT_EQ(images.size(), 3u);
-  const std::vector<Image> second = nl_means(std::span(both).last(1), &p.guides, p.valid);
+  const std::vector<Image> second = nl_means(std::span(both).last(1), &p.features, p.valid);
   EXPECT_EQ(images[0].data, p.filtered({{0.5f, {&p.f}}})[0].data);
   EXPECT_EQ(images[1].data, second[0].data);
   EXPECT_EQ(images[2].data, second[1].data);

@@ -5,8 +5,8 @@
 //
 //     minimise sum_j w_ij ((s_j - a_i - b_i (x_j - x_i))^2 + r ||b_i||^2),
 //
-// w_ij: the weights of nl_means.h with bandwidth 0.5 and without guides. A pixel is the mean of the predictions of the
-// surrounding models, weighted by w_ij, and of another filter's image with weight 1, in case no model matches the
+// w_ij: the weights of nl_means.h with bandwidth 0.5 and without features. A pixel is the mean of the predictions of
+// the surrounding models, weighted by w_ij, and of another filter's image with weight 1, in case no model matches the
 // pixel.
 #pragma once
 

@@ -164,7 +164,7 @@ class Variates {
     });
   }
 
-  /// Cells of side x side pixels: guides and residuals of kernels/residual_correction.cl.
+  /// Cells of side x side pixels: features and residuals of kernels/residual_correction.cl.
   std::pair<Buffer<float>, Buffer<float>> cells(int side) {
     const int columns = (crn_.width + side - 1) / side, rows = (crn_.height + side - 1) / side;
     const size_t size = 4 * static_cast<size_t>(columns) * rows;

@@ -25,12 +25,12 @@ const Buffer<float>* or_null(const Buffer<float>& buffer) { return buffer ? &buf
 
 }  // namespace
 
-GuideBuffers::GuideBuffers(Device& device, const Guides& guides, FilterKinds kinds)
-    : albedo_(uploaded(device, guides.albedo)),
-      normal_(uploaded(device, guides.normal)),
-      albedo_behind_(uploaded(device, guides.denoising_albedo)),
-      normal_behind_(uploaded(device, guides.denoising_normal)) {
-  const RegressionGuides regression = regression_guides(guides, kinds);
+FeatureBuffers::FeatureBuffers(Device& device, const Features& features, FilterKinds kinds)
+    : albedo_(uploaded(device, features.albedo)),
+      normal_(uploaded(device, features.normal)),
+      albedo_behind_(uploaded(device, features.denoising_albedo)),
+      normal_behind_(uploaded(device, features.denoising_normal)) {
+  const RegressionFeatures regression = regression_features(features, kinds);
   nl_means_ = regression.nl_means;
   if (regression.features.empty()) return;
   const Buffer<float> position = uploaded(device, regression.position);
@@ -41,42 +41,42 @@ GuideBuffers::GuideBuffers(Device& device, const Guides& guides, FilterKinds kin
   features_ = features_of(device, pointers, or_null(position));
 }
 
-SurfaceBuffers GuideBuffers::surfaces() const {
+SurfaceBuffers FeatureBuffers::surfaces() const {
   return {or_null(normal_), or_null(normal_behind_), or_null(albedo_), or_null(albedo_behind_)};
 }
 
-void filter(Device& device, const Groups& groups, const GuideBuffers& guides, const PartBuffers& part, bool is_half,
+void filter(Device& device, const Groups& groups, const FeatureBuffers& features, const PartBuffers& part, bool is_half,
             const Place& results) {
   const size_t values = 3 * static_cast<size_t>(groups.pixels());
-  size_t next = results.first + (guides.features() ? values : 0);  // the regression is the first
+  size_t next = results.first + (features.features() ? values : 0);  // the regression is the first
   NlMeansInput input{groups.width, groups.height, &part.noisy(), &part.noisy_error(), &groups.valid};
-  if (guides.nl_means()) {
-    if (guides.albedo()) input.guides.push_back({guides.albedo(), kAlbedoUnit});
-    if (guides.normal()) input.guides.push_back({guides.normal(), kNormalUnit});
+  if (features.nl_means()) {
+    if (features.albedo()) input.features.push_back({features.albedo(), kAlbedoUnit});
+    if (features.normal()) input.features.push_back({features.normal(), kNormalUnit});
     input.bandwidths = {kSharpBandwidth, kSmoothBandwidth};
     const std::array places = {Place{results.buffer, next}, Place{results.buffer, next + values}};
     gpu::nl_means(device, input, places);
     next += 2 * values;
   }
-  if (!guides.albedo()) return;
-  const Buffer<float> image = demodulated(device, part.noisy(), *guides.albedo());
-  const Buffer<float> error = demodulated(device, part.noisy_error(), *guides.albedo());
+  if (!features.albedo()) return;
+  const Buffer<float> image = demodulated(device, part.noisy(), *features.albedo());
+  const Buffer<float> error = demodulated(device, part.noisy_error(), *features.albedo());
   const auto clean = device.make<float>(values);
   input.image = &image, input.std_error = &error;
-  input.guides.clear();
-  if (guides.normal()) input.guides.push_back({guides.normal(), kNormalUnit});
+  input.features.clear();
+  if (features.normal()) input.features.push_back({features.normal(), kNormalUnit});
   input.bandwidths = {kSharpBandwidth};
   gpu::nl_means(device, input, {{Place{&clean}}});
-  device.launch(modulation(device, "modulate"), list_of(values), kOfList, clean, *guides.albedo(),
+  device.launch(modulation(device, "modulate"), list_of(values), kOfList, clean, *features.albedo(),
                 static_cast<int>(values), static_cast<int>(next), *results.buffer);
-  if (!guides.features()) return;
+  if (!features.features()) return;
   regressed(device,
             {.width = groups.width,
              .height = groups.height,
              .image = &part.noisy(),
              .std_error = &part.noisy_error(),
              .valid = &groups.valid,
-             .features = guides.features(),
+             .features = features.features(),
              .other = {results.buffer, next},
              .coarse = is_half},
             *results.buffer);

@@ -11,9 +11,9 @@
 namespace covary::gpu {
 
 /// Auxiliary images on a device.
-class GuideBuffers {
+class FeatureBuffers {
  public:
-  GuideBuffers(Device& device, const Guides& guides, FilterKinds kinds);
+  FeatureBuffers(Device& device, const Features& features, FilterKinds kinds);
 
   /// Null if there is none.
   const Buffer<float>* albedo() const { return albedo_ ? &albedo_ : nullptr; }
@@ -31,7 +31,7 @@ class GuideBuffers {
 };
 
 /// Writes the candidates of filter_names() to `results`, one after another. `is_half`: with coarse regression.
-void filter(Device& device, const Groups& groups, const GuideBuffers& guides, const PartBuffers& part, bool is_half,
+void filter(Device& device, const Groups& groups, const FeatureBuffers& features, const PartBuffers& part, bool is_half,
             const Place& results);
 
 }  // namespace covary::gpu

@@ -20,7 +20,7 @@ using test_support::test_device;
 
 constexpr int kWidth = 70, kHeight = 47;
 
-/// A noisy image, its error, two guides; and the same on the device.
+/// A noisy image, its error, two features; and the same on the device.
 struct Scene {
   Image image, std_error, other, albedo = Image(kWidth, kHeight, 3), normal = albedo;
   std::vector<unsigned char> valid;
@@ -47,22 +47,22 @@ struct Scene {
   }
 };
 
-Planes guide_planes(const std::vector<std::pair<const Image*, float>>& guides) {
-  Planes planes(kWidth, kHeight, 3 * static_cast<int>(guides.size()), kNlMeansRadius, 0);
-  for (size_t i = 0; i < guides.size(); ++i)
+Planes feature_planes(const std::vector<std::pair<const Image*, float>>& features) {
+  Planes planes(kWidth, kHeight, 3 * static_cast<int>(features.size()), kNlMeansRadius, 0);
+  for (size_t i = 0; i < features.size(); ++i)
     for (int y = 0; y < kHeight; ++y)
       for (int x = 0; x < kWidth; ++x)
         for (int c = 0; c < 3; ++c)
-          planes.row(3 * static_cast<int>(i) + c, y)[x] = guides[i].first->pixel(x, y)[c] / guides[i].second;
+          planes.row(3 * static_cast<int>(i) + c, y)[x] = features[i].first->pixel(x, y)[c] / features[i].second;
   return planes;
 }
 
-/// Filtered with so many guides and bandwidths on the device.
-std::vector<std::vector<float>> filtered(const Scene& s, int n_guides, std::vector<float> bandwidths, bool planted) {
+/// Filtered with so many features and bandwidths on the device.
+std::vector<std::vector<float>> filtered(const Scene& s, int n_features, std::vector<float> bandwidths, bool planted) {
   device::Device& device = test_device();
   NlMeansInput input{kWidth, kHeight, &s.d_image, &s.d_error, &s.d_valid, {}, bandwidths, planted};
-  if (n_guides > 0) input.guides.push_back({&s.d_albedo, 0.07f});
-  if (n_guides > 1) input.guides.push_back({&s.d_normal, 0.2f});
+  if (n_features > 0) input.features.push_back({&s.d_albedo, 0.07f});
+  if (n_features > 1) input.features.push_back({&s.d_normal, 0.2f});
   const size_t values = s.image.data.size();
   const auto result = device.make<float>(bandwidths.size() * values);
   std::vector<Place> places;
@@ -75,17 +75,17 @@ std::vector<std::vector<float>> filtered(const Scene& s, int n_guides, std::vect
 
 TEST(GpuNlMeans, IsThatOfTheProcessor) {
   const Scene s;
-  for (const int n_guides : {0, 1, 2})
+  for (const int n_features : {0, 1, 2})
     for (const std::vector<float>& bandwidths : {std::vector{0.5f}, std::vector{0.5f, 1.0f}}) {
-      SCOPED_TRACE(n_guides);
-      std::vector<std::pair<const Image*, float>> guides = {{&s.albedo, 0.07f}, {&s.normal, 0.2f}};
-      guides.resize(static_cast<size_t>(n_guides));
-      const Planes planes = n_guides ? guide_planes(guides) : Planes();
+      SCOPED_TRACE(n_features);
+      std::vector<std::pair<const Image*, float>> features = {{&s.albedo, 0.07f}, {&s.normal, 0.2f}};
+      features.resize(static_cast<size_t>(n_features));
+      const Planes planes = n_features ? feature_planes(features) : Planes();
       NlMeansSteering steering{&s.image, &s.std_error, {}};
       for (const float bandwidth : bandwidths) steering.tasks.push_back({bandwidth, {&s.image}});
       const std::vector<Image> expected =
-          covary::nl_means(std::span(&steering, 1), n_guides ? &planes : nullptr, s.valid);
-      const std::vector<std::vector<float>> found = filtered(s, n_guides, bandwidths, false);
+          covary::nl_means(std::span(&steering, 1), n_features ? &planes : nullptr, s.valid);
+      const std::vector<std::vector<float>> found = filtered(s, n_features, bandwidths, false);
       for (size_t i = 0; i < found.size(); ++i) EXPECT_TRUE(agree(expected[i].data, found[i]));
     }
 }

@@ -26,7 +26,7 @@ class MeanDenoising {
   MixedDenoising run() {
     stages_.run("copy samples and auxiliary images", [&] {
       groups_ = upload(device_, request_.independent);
-      guides_.emplace(device_, request_.guides, request_.kinds);
+      features_.emplace(device_, request_.features, request_.kinds);
     });
     stages_.run("means and errors", [&] { parts_ = parts_of_mean(device_, groups_); });
     stages_.run(request_.network ? "candidates, with the network" : "candidates", [&] { make_candidates(); });
@@ -60,13 +60,13 @@ class MeanDenoising {
       makers_.push_back(
           neural_candidates({}, {}, CandidateBase::kMean, std::make_shared<const NetworkImages>(network)));
     }
-    makers_.emplace_back().names = filter_names(request_.guides, CandidateBase::kMean, request_.kinds);
-    add_weighing_maker(request_.guides, makers_);
+    makers_.emplace_back().names = filter_names(request_.features, CandidateBase::kMean, request_.kinds);
+    add_weighing_maker(request_.features, makers_);
     n_candidates_ = static_cast<int>(names_of(makers_).size());
     for (size_t i = 0; i < parts_.size(); ++i) {
       candidates_[i] = device_.make<float>(3 * pixels() * n_candidates_);
       const size_t filtered = request_.network ? 3 * pixels() * kNetworkCandidates : 0;
-      filter(device_, groups_, *guides_, parts_[i], i > 0, {&candidates_[i], filtered});
+      filter(device_, groups_, *features_, parts_[i], i > 0, {&candidates_[i], filtered});
       if (request_.network) add_network(network.images[i], i);
       if (makers_.back().shares) add_weighed_candidate(i);
     }
@@ -136,7 +136,7 @@ class MeanDenoising {
     rows.disagreement = downloaded(disagreement(device_, made, mixed.image), 1);
     rows.result.bias = held_out_bias(device_, held_out, {&candidates_[1], &candidates_[2]});
     rows.result.risk_rows =
-        image_risk(device_, held_out, mixed.image, parts_[0].independent, groups_, guides_->surfaces());
+        image_risk(device_, held_out, mixed.image, parts_[0].independent, groups_, features_->surfaces());
     for (const auto& [error, n] : base_rows(device_, held_out, parts_[0].std_error)) rows.of_base.push_back({error, n});
     for (int p = 0; p < n_candidates_; ++p) {
       const size_t first = 3 * pixels() * p;
@@ -160,7 +160,7 @@ class MeanDenoising {
   const MeanMixture& request_;
   Stages stages_;
   Groups groups_;
-  std::optional<GuideBuffers> guides_;
+  std::optional<FeatureBuffers> features_;
   std::array<PartBuffers, 3> parts_;
   std::vector<CandidateMaker> makers_;
   int n_candidates_ = 0, network_runs_ = 0;

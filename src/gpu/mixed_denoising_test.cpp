@@ -48,17 +48,17 @@ Method denoised_mean(DenoiseMode mode, bool on_device) {
   return with_denoising(make_estimator(kMixture), options);
 }
 
-EstimatorResult picture_of(const test::Grouped& image, const Guides& guides, DenoiseMode mode, bool on_device,
+EstimatorResult picture_of(const test::Grouped& image, const Features& features, DenoiseMode mode, bool on_device,
                            bool std_error = true) {
   MethodSettings settings;
   settings.std_error = std_error;
-  settings.guides = guides;
+  settings.features = features;
   return with_error(denoised_mean(mode, on_device).image({{}, image.view()}, settings));
 }
 
-void expect_same(const test::Grouped& image, const Guides& guides, DenoiseMode mode) {
-  const EstimatorResult expected = picture_of(image, guides, mode, false),
-                        found = picture_of(image, guides, mode, true);
+void expect_same(const test::Grouped& image, const Features& features, DenoiseMode mode) {
+  const EstimatorResult expected = picture_of(image, features, mode, false),
+                        found = picture_of(image, features, mode, true);
   EXPECT_TRUE(agree(expected.estimate.data, found.estimate.data));
   EXPECT_TRUE(agree(expected.std_error.data, found.std_error.data));
   EXPECT_TRUE(agree(expected.bias.data, found.bias.data));
@@ -114,19 +114,20 @@ TEST(GpuMixedDenoising, TakesTheImagesOfANetwork) {
   test::Grouped image = test::noisy_image(kWidth, kHeight, 6, 27, 1);
   for (int i = 0; i < kWidth * kHeight; ++i) image.counts.push_back(12 + static_cast<uint32_t>(i % 5));
   image.pixel(30, 30)[0] = 2000;  // a firefly
-  const Guides guides{&p.albedo, &p.normal};
+  const Features features{&p.albedo, &p.normal};
   DenoisingParts parts = covary::parts_of_mean(image.view());
   const auto network = [](const std::array<Image, 3>& noisy) {
     return NetworkImages{{blurred(noisy[0]), blurred(noisy[1]), blurred(noisy[2])}, 3};
   };
   const auto made = std::make_shared<const NetworkImages>(
       network({parts.whole.limited->estimate, parts.halves[0].limited->estimate, parts.halves[1].limited->estimate}));
-  const std::vector<CandidateMaker> makers = {neural_candidates({}, {}, CandidateBase::kMean, made),
-                                              filtered_candidates(guides, CandidateBase::kMean, FilterKinds::kNlMeans)};
-  parts.guides = guides;
+  const std::vector<CandidateMaker> makers = {
+      neural_candidates({}, {}, CandidateBase::kMean, made),
+      filtered_candidates(features, CandidateBase::kMean, FilterKinds::kNlMeans)};
+  parts.features = features;
   const MixedDenoising expected = denoise_by_mixture(std::move(parts), makers, DenoiseMode::kAuto, true);
   const MixedDenoising found =
-      mix_mean(test_device(), {image.view(), guides, FilterKinds::kNlMeans, {1, 1, false}, network, true, true});
+      mix_mean(test_device(), {image.view(), features, FilterKinds::kNlMeans, {1, 1, false}, network, true, true});
   EXPECT_EQ(found.names, expected.names);
   EXPECT_EQ(found.result.network_runs, 3);
   for (size_t i = 0; i < expected.candidates.size(); ++i)
@@ -164,9 +165,9 @@ TEST(GpuMixedDenoising, TimesItsStages) {
 TEST(GpuMixedDenoising, IsTheSameEveryTime) {
   const Pictures p;
   const test::Grouped image = test::noisy_image(kWidth, kHeight, 12, 24, 1);
-  const Guides guides{&p.albedo, &p.normal};
-  const EstimatorResult first = picture_of(image, guides, DenoiseMode::kAuto, true),
-                        second = picture_of(image, guides, DenoiseMode::kAuto, true);
+  const Features features{&p.albedo, &p.normal};
+  const EstimatorResult first = picture_of(image, features, DenoiseMode::kAuto, true),
+                        second = picture_of(image, features, DenoiseMode::kAuto, true);
   EXPECT_EQ(first.estimate.data, second.estimate.data);
   EXPECT_EQ(first.std_error.data, second.std_error.data);
 }
@@ -175,7 +176,7 @@ TEST(GpuMixedDenoising, TellsItsStages) {
   const Pictures p;
   const test::Grouped image = test::noisy_image(kWidth, kHeight, 6, 26, 1);
   MethodSettings settings;
-  settings.guides = {&p.albedo, &p.normal};
+  settings.features = {&p.albedo, &p.normal};
   const auto expected = denoised_mean(DenoiseMode::kAuto, false).stages({{}, image.view()}, settings),
              found = denoised_mean(DenoiseMode::kAuto, true).stages({{}, image.view()}, settings);
   ASSERT_EQ(found.size(), 10u);

@@ -49,7 +49,7 @@ struct PartOnDevice {
 struct Example {
   test::Grouped groups = test::noisy_image(kWidth, kHeight, 10, 8, 1);
   Image albedo = Image(kWidth, kHeight, 3), normal = albedo, normal_behind = albedo;
-  Guides guides{&albedo, &normal, &albedo, &normal_behind};
+  Features features{&albedo, &normal, &albedo, &normal_behind};
   std::vector<CandidateMaker> makers;
   PartsWeighting weighting;
   DenoisingParts parts;
@@ -67,9 +67,9 @@ struct Example {
           if (x < 15) normal_behind.pixel(x, y)[c] = 0.9f;  // a mirror
         }
     groups.pixel(3, 4)[1] = INFINITY;
-    makers = {filtered_candidates(guides, CandidateBase::kMean, kinds)};
+    makers = {filtered_candidates(features, CandidateBase::kMean, kinds)};
     parts = covary::parts_of_mean(groups.view());
-    parts.guides = guides;
+    parts.features = features;
     mixed = mix_parts(parts, makers, weighting);
     on_device = {PartOnDevice(parts.whole, mixed.whole), PartOnDevice(parts.halves[0], mixed.halves[0]),
                  PartOnDevice(parts.halves[1], mixed.halves[1])};
@@ -182,9 +182,9 @@ TEST(GpuHeldOut, BiasIsThatOfTheProcessor) {
     for (float& value : image.data) value *= value < 0.5f ? 1.3f : 1.0f;
     example.halves[half] = up(image.data);
   }
-  const std::array guides = {&guide_of(example.mixed.halves[0]), &guide_of(example.mixed.halves[1])};
+  const std::array features = {&guide_of(example.mixed.halves[0]), &guide_of(example.mixed.halves[1])};
   const Image expected =
-      covary::held_out_bias({example.expected.halves, guides, example.expected.independent, &example.parts.valid});
+      covary::held_out_bias({example.expected.halves, features, example.expected.independent, &example.parts.valid});
   ASSERT_GT(std::count_if(expected.data.begin(), expected.data.end(), [](float b) { return b != 0; }), 500);
   const std::array on_device = {
       std::as_const(example.on_device[1].candidates).size() ? &example.on_device[1].candidates : nullptr,
@@ -204,7 +204,7 @@ TEST(GpuHeldOut, RiskIsThatOfTheProcessor) {
   const GroupedImage view = example.groups.view();
   const std::vector<RiskRow> expected = covary::image_risk(
       {&example.mixed.mixture.image, example.expected.halves, &example.parts.whole.independent,
-       example.expected.independent, &view, example.expected.guide, &example.parts.valid, example.guides});
+       example.expected.independent, &view, example.expected.guide, &example.parts.valid, example.features});
   const Groups groups = upload(test_device(), view);
   const Buffer<float> normal = up(example.normal.data), behind = up(example.normal_behind.data);
   const auto found = [&](bool planted_bug) {

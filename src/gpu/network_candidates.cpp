@@ -50,10 +50,10 @@ void write_network_candidates(Device& device, const Groups& groups, const PartBu
     first += 3 * pixels;
     const int side = options.cell, columns = (width + side - 1) / side, rows = (height + side - 1) / side;
     const auto cells = static_cast<size_t>(columns) * rows;
-    const auto guides = device.make<float>(4 * cells), residuals = device.make<float>(4 * cells);
+    const auto features = device.make<float>(4 * cells), residuals = device.make<float>(4 * cells);
     device.launch(kernel(device, "residual_cells", side), image_of(columns, rows), kOfImage, image, groups.valid, guide,
-                  other, width, height, guides, residuals);
-    device.launch(kernel(device, "add_residual", side, planted_bug), image_of(width, height), kOfImage, guides,
+                  other, width, height, features, residuals);
+    device.launch(kernel(device, "add_residual", side, planted_bug), image_of(width, height), kOfImage, features,
                   residuals, groups.valid, image, width, height, options.window / 2 / side, options.bandwidth,
                   static_cast<int>(first), results);
   }

@@ -15,8 +15,8 @@ struct Place {
   size_t first = 0;
 };
 
-/// A guide image, to be divided by `unit`.
-struct GuideBuffer {
+/// A feature, to be divided by `unit`.
+struct FeatureImage {
   const device::Buffer<float>* image = nullptr;
   float unit = 1;
 };
@@ -26,9 +26,9 @@ struct NlMeansInput {
   const device::Buffer<float>* image = nullptr;
   const device::Buffer<float>* std_error = nullptr;
   const device::Buffer<unsigned char>* valid = nullptr;
-  std::vector<GuideBuffer> guides;  ///< at most two
-  std::vector<float> bandwidths;    ///< one or two
-  bool planted_bug = false;         ///< for tests
+  std::vector<FeatureImage> features;  ///< at most two
+  std::vector<float> bandwidths;       ///< one or two
+  bool planted_bug = false;            ///< for tests
 };
 
 /// Writes the filtered image of each bandwidth to its place.

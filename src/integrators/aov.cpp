@@ -23,7 +23,7 @@ constexpr size_t kPosition = feature::kPosition;
 constexpr uint32_t kRound = 16;
 constexpr float kTolerance = 0.01f;
 /// Surfaces that a pixel's rays may meet, per ray that it may have. Through much glass this is the limit: more rays
-/// lower the error of the denoised image less than the time that they take (docs/notes/denoising.md, "Guides without
+/// lower the error of the denoised image less than the time that they take (docs/notes/denoising.md, "Features without
 /// noise").
 constexpr size_t kSurfacesPerRay = 3;
 

@@ -207,11 +207,11 @@ void LiveRender::show_denoised(std::span<const Pass> passes) {
   };
   const CoarseGroups independent = taken(last), crn = is_pair ? taken(first) : CoarseGroups{};
   std::map<std::string, Image> aovs;
-  if (aovs_ && plan.method->reads_guides)
+  if (aovs_ && plan.method->reads_features)
     for (const auto& [name, image] : *aovs_) aovs[name] = coarse_image(image, stride);
   MethodSettings settings;
   settings.crn_samples = std::max<int64_t>(1, std::llround(first.mean_count()));
-  settings.guides = guides_among(aovs);
+  settings.features = features_among(aovs);
   EstimatorResult made = plan.method->image({crn.image, independent.image}, settings);
   show("picture", made.estimate, stride);
   page_.remove("picture:error");

@@ -69,8 +69,9 @@ bool is_integer(const ImageFacts& image) {
 }  // namespace
 
 std::map<std::string, std::string> inherited_attributes(std::span<const std::map<std::string, std::string>> files) {
-  static const std::set<std::string> of_samples = {"seed",     "sampling",   "scene_hash", "settings",     "samples",
-                                                   "training", "light_film", "exposure",   "clean_guides", "complete"};
+  static const std::set<std::string> of_samples = {"seed",           "sampling", "scene_hash", "settings",
+                                                   "samples",        "training", "light_film", "exposure",
+                                                   "clean_features", "complete"};
   std::map<std::string, std::string> result;
   if (files.empty()) return result;
   for (const auto& [name, value] : files[0]) {

@@ -20,7 +20,7 @@ constexpr uint32_t kTrialPass = 2;  // pass number in its random numbers, which 
 std::vector<double> filtered_errors(const DenoisedMean& denoise, const Film& first, const PlanState& state) {
   MethodSettings settings;
   settings.std_error = true;
-  settings.guides = state.guides;
+  settings.features = state.features;
   const EstimatorResult image = denoise(rows_of(first, 0, first.height()), settings);
   std::vector<double> errors(first.counts().size());
   if (image.std_error.data.empty()) return errors;

@@ -138,7 +138,7 @@ MethodImage image_of(const Plan& plan, std::span<const Pass> passes, int first_r
   settings.std_error = method.predicts_error;
   // With common random numbers, errors of a mean are correlated between pixels, which variances do not show.
   settings.held_out = method.pair() || passes[0].plan.sampling == Sampling::kIndependent;
-  settings.guides = beside.guides, settings.layers = beside.layers;
+  settings.features = beside.features, settings.layers = beside.layers;
   const Film sum = plan.adds_films ? joined(passes[0].film, passes[1].film) : Film();
   Samples samples;
   samples.independent = rows_of(plan.adds_films ? sum : passes.back().film, first_row, n_rows);

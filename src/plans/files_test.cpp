@@ -163,20 +163,20 @@ TEST(Failure, FilmsOfAFolderAreThereBeforeTheEstimate) {
   render(scene, plan, request);
 }
 
-TEST(Estimate, GetsAllAuxiliaryImagesAsGuides) {
+TEST(Estimate, GetsAllAuxiliaryImagesAsFeatures) {
   const LoadedScene scene = load_sized(kRoom);
   const TemporaryFolder folder;
   RenderRequest request = request_of(24);
   request.output = folder.file("a.exr");
   Method guided_average = average_estimator();
-  guided_average.reads_guides = true;
+  guided_average.reads_features = true;
   std::map<std::string, std::vector<float>> guided;
   const Plan plan = with_image(pair_plan(guided_average), [&](const auto& make, const MethodSettings& settings) {
-    guided = {{"Albedo", settings.guides.albedo->data},
-              {"N", settings.guides.normal->data},
-              {"DenoisingAlbedo", settings.guides.denoising_albedo->data},
-              {"DenoisingNormal", settings.guides.denoising_normal->data},
-              {"P", settings.guides.position->data}};
+    guided = {{"Albedo", settings.features.albedo->data},
+              {"N", settings.features.normal->data},
+              {"DenoisingAlbedo", settings.features.denoising_albedo->data},
+              {"DenoisingNormal", settings.features.denoising_normal->data},
+              {"P", settings.features.position->data}};
     return make();
   });
   const RenderResult result = render(scene, plan, request);

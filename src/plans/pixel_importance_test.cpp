@@ -23,7 +23,7 @@ Film film_of(const Spectrum& value) {
 std::vector<Spectrum> importance_of(const Spectrum& value) {
   const LoadedScene scene = load_sized(kRoom);
   const Film film = film_of(value);
-  return pixel_importance(pixel_guides(*scene.scene, scene.filter, film, nullptr), film, std::nullopt);
+  return pixel_importance(pixel_features(*scene.scene, scene.filter, film, nullptr), film, std::nullopt);
 }
 
 TEST(PixelImportance, IsInverseToTheValue) {

@@ -77,7 +77,7 @@ struct PlanState {
   /// With a time limit: the time left for everything that follows when a phase's targets are set.
   std::optional<double> seconds_left;
   std::vector<Pass> passes;  ///< of this phase and all earlier ones, in the plan's order
-  Guides guides;             ///< of the whole window, for the targets of the last phase, if Method::reads_guides
+  Features features;         ///< of the whole window, for the targets of the last phase, if Method::reads_features
 
   /// The pass with this name and number. Throws Error(kInternal) if none has begun.
   const Pass& pass(const std::string& name, uint32_t number = 0) const;
@@ -97,7 +97,7 @@ struct Phase {
 
 /// What a method may read in addition to the films, for its rows.
 struct Beside {
-  Guides guides;              ///< if Method::reads_guides
+  Features features;          ///< if Method::reads_features
   std::vector<Layer> layers;  ///< if Method::splits_layers(); empty if none were requested
 };
 

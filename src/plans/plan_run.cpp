@@ -178,7 +178,7 @@ bool PlanRun::render_phase(size_t index, double share) {
     take_first_samples(passes[0]);
     if (!stopped()) render_auxiliary_images();
   }
-  state_.guides = guides();
+  state_.features = features();
   if (timed() && !in_rounds()) state_.seconds_left = seconds_left(index, share);
   set_targets(phase, passes.first(camera_passes(passes).size()));
   if (passes.back().plan.light) set_light_target(*state_.integrator, camera_passes(state_.passes), passes.back());

@@ -101,9 +101,9 @@ class PlanRun {
     const bool has_error = plan_.method->predicts_error && state_.passes[0].film.groups() > 1;
     return !plan_.makes_film() || has_error || request_.until > 0 || request_.splits_layers();
   }
-  /// Guides of the whole window; empty if the plan reads none or they do not exist.
-  Guides guides() const { return plan_.method->reads_guides ? guides_among(result_.aovs) : Guides(); }
-  bool needs_aovs() const { return request_.aovs || plan_.method->reads_guides; }
+  /// Features of the whole window; empty if the plan reads none or they do not exist.
+  Features features() const { return plan_.method->reads_features ? features_among(result_.aovs) : Features(); }
+  bool needs_aovs() const { return request_.aovs || plan_.method->reads_features; }
   bool stopped() const { return callbacks_.stop && callbacks_.stop->load(); }
   /// The passes of every phase exist.
   bool all_begun() const {

@@ -34,8 +34,8 @@ constexpr double kEstimateOfInterrupted = 0.5;  // seconds allowed for it; after
 
 EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows, std::span<const Film> layers) const {
   std::array<Image, 5> images;
-  Beside beside{guides(), {}};
-  Guides& g = beside.guides;
+  Beside beside{features(), {}};
+  Features& g = beside.features;
   for (size_t i = 0;
        const Image** guide : {&g.albedo, &g.normal, &g.denoising_albedo, &g.denoising_normal, &g.position})
     if (*guide) images[i] = rows_of(**guide, first_row, n_rows), *guide = &images[i++];

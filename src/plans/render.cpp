@@ -77,7 +77,7 @@ const Pass& PlanState::pass(const std::string& name, uint32_t number) const {
 
 Image RenderResult::picture() const { return image.estimate.data.empty() ? preview_of(passes) : image.estimate; }
 
-Guides guides_among(const std::map<std::string, Image>& aovs) {
+Features features_among(const std::map<std::string, Image>& aovs) {
   const auto find = [&](const char* name) {
     const auto found = aovs.find(name);
     return found == aovs.end() ? nullptr : &found->second;

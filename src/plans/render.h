@@ -129,7 +129,7 @@ struct RenderResult {
 };
 
 /// The images of RenderResult::aovs that guide a denoiser; null if missing.
-Guides guides_among(const std::map<std::string, Image>& aovs);
+Features features_among(const std::map<std::string, Image>& aovs);
 
 /// The sampler of camera samples: the request's, or the equivalent of the scene's: independent random numbers for
 /// `independent` or none, Sobol' points for each of Mitsuba's stratified and low-discrepancy samplers.

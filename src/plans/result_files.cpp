@@ -43,7 +43,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
     film.aovs = aovs;
     film.shown = result.image.estimate;
     for (const auto& [key, value] : prediction_attributes(result.predicted)) film.attributes[key] = value;
-    if (aovs.contains("Albedo")) film.attributes[film_key::kCleanGuides] = "true";
+    if (aovs.contains("Albedo")) film.attributes[film_key::kCleanFeatures] = "true";
     write_film(request.output, film, result.image.std_error);
   } else {
     const Film& film = last;
@@ -58,7 +58,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
       attributes["covary:device"] = device;
     if (result.interrupted) attributes[std::string("covary:") + film_key::kComplete] = "false";
     attributes["covary:samples"] = fmt::format("{:g}", result.samples_per_pixel());
-    if (aovs.contains("Albedo")) attributes[std::string("covary:") + film_key::kCleanGuides] = "true";
+    if (aovs.contains("Albedo")) attributes[std::string("covary:") + film_key::kCleanFeatures] = "true";
     const ImagePlace place{film.frame_width(), film.frame_height(), film.crop()};
     EstimatorResult mean;  // of an interrupted render whose films have too few samples for the estimator
     if (!estimated) mean.estimate = result.picture();

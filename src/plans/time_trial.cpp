@@ -75,7 +75,7 @@ double PlanRun::end_of_band(int n_rows, std::span<const PassPlan> plans) {
     for (const AuxiliaryFeature& feature : kAuxiliaryFeatures)
       result.aovs[feature.layer] = made_up_image(band.width, n_rows);
   Beside beside;
-  if (plan_.method->reads_guides) beside.guides = guides_among(result.aovs);
+  if (plan_.method->reads_features) beside.features = features_among(result.aovs);
   const Stopwatch watch;
   if (!plan_.makes_film() && !request_.films_only)
     run_stoppable(callbacks_.stop, [&] { result.image = finish(image_of(plan_, result.passes, 0, n_rows, beside)); });

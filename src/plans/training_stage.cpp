@@ -28,11 +28,11 @@ bool train(const LoadedScene& scene, const RenderRequest& request, Integrator& i
   settings.seed = request.seed;
   const bool by_oidn = learning && learning->pilot_by_oidn();
   if (by_oidn && request.load_training.empty()) denoiser_info({request.oidn});  // throws before rendering starts
-  settings.importance = [&, by_oidn, guides = PixelGuides()](const Film& film) mutable {
+  settings.importance = [&, by_oidn, features = PixelFeatures()](const Film& film) mutable {
     const Stopwatch surrogate;
-    if (guides.empty()) guides = pixel_guides(*scene.scene, settings.filter, film, settings.stop);
+    if (features.empty()) features = pixel_features(*scene.scene, settings.filter, film, settings.stop);
     const std::optional<DenoiseOptions> oidn = by_oidn ? std::optional(DenoiseOptions{request.oidn}) : std::nullopt;
-    std::vector<Spectrum> importance = pixel_importance(guides, film, oidn);
+    std::vector<Spectrum> importance = pixel_importance(features, film, oidn);
     seconds.surrogate += surrogate.seconds();
     return importance;
   };
@@ -55,23 +55,23 @@ void add_training(const Film& film, const TrainingImage& training, int first_row
     }
 }
 
-PixelGuides pixel_guides(const Scene& scene, const FilterSettings& filter, const Film& film,
-                         const std::atomic<bool>* stop) {
-  constexpr uint32_t kGuideSamples = 2;
+PixelFeatures pixel_features(const Scene& scene, const FilterSettings& filter, const Film& film,
+                             const std::atomic<bool>* stop) {
+  constexpr uint32_t kFeatureSamples = 2;
   PassSettings settings;
   settings.pass = kTrainingPass, settings.filter = filter;
-  Film guides(film.frame_width(), film.frame_height(), film.crop(), 1);
-  render_aovs(scene, settings, kGuideSamples, guides, stop);
-  if (!guides.aovs.contains("N")) return {};
-  return {std::move(guides.aovs.at("Albedo")), std::move(guides.aovs.at("N"))};
+  Film features(film.frame_width(), film.frame_height(), film.crop(), 1);
+  render_aovs(scene, settings, kFeatureSamples, features, stop);
+  if (!features.aovs.contains("N")) return {};
+  return {std::move(features.aovs.at("Albedo")), std::move(features.aovs.at("N"))};
 }
 
-std::vector<Spectrum> pixel_importance(const PixelGuides& guides, const Film& film,
+std::vector<Spectrum> pixel_importance(const PixelFeatures& features, const Film& film,
                                        const std::optional<DenoiseOptions>& oidn) {
   constexpr float kSmallest = 0.01f;  // as in relMSE
-  if (guides.empty()) return {};
-  const Image value = oidn ? denoise(film.mean_image(), &guides.albedo, &guides.normal, *oidn)
-                           : joint_bilateral(film.mean_image(), guides.albedo, guides.normal);
+  if (features.empty()) return {};
+  const Image value = oidn ? denoise(film.mean_image(), &features.albedo, &features.normal, *oidn)
+                           : joint_bilateral(film.mean_image(), features.albedo, features.normal);
   std::vector<Spectrum> importance;
   for (int y = 0; y < value.height; ++y)
     for (int x = 0; x < value.width; ++x) {

@@ -29,19 +29,19 @@ void add_training(const Film& film, const TrainingImage& training, int first_row
 // What integrators that learn are told about the image before training.
 
 /// Albedo and normals of the pixels of a film, which guide the denoising of its values.
-struct PixelGuides {
+struct PixelFeatures {
   Image albedo, normal;
   bool empty() const { return normal.data.empty(); }
 };
 
 /// Renders those of `film`'s pixels; empty if stopped.
-PixelGuides pixel_guides(const Scene& scene, const FilterSettings& filter, const Film& film,
-                         const std::atomic<bool>* stop);
+PixelFeatures pixel_features(const Scene& scene, const FilterSettings& filter, const Film& film,
+                             const std::atomic<bool>* stop);
 
 /// Weight of an error in each channel of each pixel, so that relative errors count equally: 1 / √(value² + 0.01), with
 /// the value of the denoised film ([Hua2023] Eq. 25) and the constant of relMSE. Denoised by joint_bilateral(), or with
-/// `oidn` by Open Image Denoise, which must then be installed. Empty without guides.
-std::vector<Spectrum> pixel_importance(const PixelGuides& guides, const Film& film,
+/// `oidn` by Open Image Denoise, which must then be installed. Empty without features.
+std::vector<Spectrum> pixel_importance(const PixelFeatures& features, const Film& film,
                                        const std::optional<DenoiseOptions>& oidn);
 
 // Training files (docs/file-formats.md).

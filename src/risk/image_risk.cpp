@@ -43,7 +43,7 @@ PixelRisk risk_at(const ImageRiskInput& in, int x, int y) {
 }
 
 /// Whether the pixel shows a mirror or glass: the surface behind differs from the first one.
-bool is_specular(const Guides& surfaces, int x, int y) {
+bool is_specular(const Features& surfaces, int x, int y) {
   const auto differ = [&](const Image* first, const Image* behind) {
     if (!first || !behind) return false;
     const float *a = first->pixel(x, y), *b = behind->pixel(x, y);

@@ -32,7 +32,7 @@ struct ImageRiskInput {
   const GroupedImage* groups = nullptr;             ///< the groups whose mean is h
   const Image* guide = nullptr;                     ///< errors are relative to its brightness
   const std::vector<unsigned char>* valid = nullptr;
-  Guides surfaces = {};  ///< tell mirrors and glass, where the surfaces behind them are known, too
+  Features surfaces = {};  ///< tell mirrors and glass, where the surfaces behind them are known, too
 };
 
 /// Sums over each row of the image. Rows are independent, so those of bands can be joined. Bit-identical for any number

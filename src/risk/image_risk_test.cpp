@@ -131,7 +131,7 @@ TEST(ImageRisk, TellsTheNoiseInMirrorsAndBehindGlass) {
     for (int x = 0; x < kWidth / 4; ++x) *behind_mirror.pixel(x, y) = -1, *behind_glass.pixel(x + kWidth / 4, y) = 0.9f;
   const std::vector<unsigned char> valid(static_cast<size_t>(kWidth) * kHeight, 1);
   const Moments mean = moments(samples.image, valid, 0, 0.0f);
-  const auto specular = [&](const Guides& surfaces) {
+  const auto specular = [&](const Features& surfaces) {
     const RiskRow sums = sum_of(image_risk({&guide, {}, &mean, {}, &samples.image, &guide, &valid, surfaces}));
     return sums.specular_noise / sums.noise;
   };

@@ -46,7 +46,7 @@ TEST(FeatureSlopes, LeaveOutPixelsThatAreNotFinite) {
   EXPECT_NEAR(feature_slopes(picture, features, 4, 4)[1], 2, 0.05f);
 }
 
-TEST(FeatureSlopes, NeedBothGuides) {
+TEST(FeatureSlopes, NeedBothFeatures) {
   EXPECT_TRUE(history_features(Image(), Image(2, 1, 3)).data.empty());
   Image albedo(2, 1, 3), normal(2, 1, 3);
   albedo.pixel(1, 0)[2] = 0.3f, normal.pixel(1, 0)[0] = -1;

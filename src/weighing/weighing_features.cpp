@@ -101,13 +101,13 @@ void add_difference(const Colours& image, const Colours& base, float inverse, Fe
   features.add(rooted(mean_square(image, base, inverse)));
 }
 
-void add_guides(const WeighingGuides& guides, int x, int y, Features& features) {
-  if (!guides.albedo) {
+void add_surfaces(const WeighingSurfaces& surfaces, int x, int y, Features& features) {
+  if (!surfaces.albedo) {
     for (int i = 0; i < 10; ++i) features.add(0);
     return;
   }
-  const Colours second[2] = {cell_of(*guides.denoising_albedo, x, y), cell_of(*guides.denoising_normal, x, y)};
-  const Colours first[2] = {cell_of(*guides.albedo, x, y), cell_of(*guides.normal, x, y)};
+  const Colours second[2] = {cell_of(*surfaces.denoising_albedo, x, y), cell_of(*surfaces.denoising_normal, x, y)};
+  const Colours first[2] = {cell_of(*surfaces.albedo, x, y), cell_of(*surfaces.normal, x, y)};
   for (const Colours& cell : second)
     for (const float value : mean_of(cell)) features.add(value);
   for (const Colours& cell : second) features.add(std::sqrt(mean_square(cell, spread_over(mean_of(cell)), 1)));
@@ -128,7 +128,7 @@ void add_cell(const WeighingInput& in, float local, int x, int y, Features& feat
     features.add(ratio / (1 + ratio));
   }
   features.add(rooted(mean_square(base, spread_over(mean), inverse)));
-  add_guides(in.guides, x, y, features);
+  add_surfaces(in.surfaces, x, y, features);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@
 namespace covary {
 
 /// Auxiliary features: albedo and normal, of the first surface and of those behind mirrors and glass; all or none.
-struct WeighingGuides {
+struct WeighingSurfaces {
   const Image *albedo = nullptr, *normal = nullptr, *denoising_albedo = nullptr, *denoising_normal = nullptr;
 };
 
@@ -20,7 +20,7 @@ struct WeighingInput {
   const Image* mean = nullptr;        ///< of the samples
   std::span<const Image> candidates;  ///< made of it
   const Image* std_error = nullptr;   ///< of the mean without fireflies
-  WeighingGuides guides;
+  WeighingSurfaces surfaces;
 };
 
 /// Side of a cell in pixels.

@@ -19,7 +19,7 @@ SIZE = WIDTH, HEIGHT = 20, 240
 GROUPS = 12
 NETWORK = ("--oidn", os.environ["STAND_IN_DENOISER"])
 FILTERS = ("--oidn", "off")
-GUIDES = ("--guides", "guides.exr")
+GUIDES = ("--features", "features.exr")
 MODES = ("auto", "bias", "balanced", "error")
 
 #: Methods that combine a pair: words of the program.
@@ -112,7 +112,7 @@ class OptionsTest(CliTest):
             write(f"frame{n}", {**groups(frame), **{f"Motion.{c}": [0.0] * WIDTH * HEIGHT for c in "XYZ"}})
         for g, image in enumerate(images):  # with a layer
             write(f"group{g}", {**image, **{f"part.{c}": [v * 0.25 for v in image[c]] for c in "RGB"}})
-        write("guides", {f"{name}.{c}": [rng.random() * 0.5 + 0.25 for _ in range(WIDTH * HEIGHT)]
+        write("features", {f"{name}.{c}": [rng.random() * 0.5 + 0.25 for _ in range(WIDTH * HEIGHT)]
                          for name, letters in (("Albedo", "RGB"), ("N", "XYZ")) for c in letters})
 
     def setUp(self):
@@ -219,9 +219,9 @@ class Python(OptionsTest):
     def compare(self, command, words, *images):
         import covary
         arguments = keywords(words)
-        if arguments.pop("guides", None):
-            arguments |= {"albedo": covary.read_image(self.path / "guides.exr", "Albedo"),
-                          "normal": covary.read_image(self.path / "guides.exr", "N")}
+        if arguments.pop("features", None):
+            arguments |= {"albedo": covary.read_image(self.path / "features.exr", "Albedo"),
+                          "normal": covary.read_image(self.path / "features.exr", "N")}
         estimator = arguments.pop("estimator", "mixture")
         result = covary.combine(*images, estimator, force=True, **arguments)
         plain = covary.combine(*images, estimator, force=True, std_error=False, **arguments)

@@ -115,7 +115,7 @@ class Program(AddonTest):
         self.assertEqual({group.samples for group in self.cycles.groups_of(96, 12, 0)}, {4})
         alone = [group for seed in (0, 1) for group in self.cycles.groups_of(96, 12, seed, self.cycles.INDEPENDENT)]
         self.assertEqual(len({group.seed for group in alone}), 24)
-        self.assertEqual({(group.kind, group.samples, group.guides) for group in alone}, {("independent", 8, True)})
+        self.assertEqual({(group.kind, group.samples, group.features) for group in alone}, {("independent", 8, True)})
 
     def test_error_and_time_on_the_way(self):
         self.assertEqual(self.program.read_error('{"image": "b.exr", "relmse": 0.06}', 3), 0.01)

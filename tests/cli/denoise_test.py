@@ -69,18 +69,18 @@ class Denoise(RenderTest):
         self.assertLess(errors["balanced"], 0.9 * errors["none"])
         self.assertLess(errors["error"], 0.8 * errors["none"])
 
-    def test_combine_of_films_and_guides_gives_the_same_bits(self):
+    def test_combine_of_films_and_features_gives_the_same_bits(self):
         self.good("render", ROOM, *SMALL, "-o", "a.exr", *IICV, "--denoise", "balanced", *PLAIN, "--spp", "24",
                   "--aovs", "--passes", "films", "--save-stages", "steps")
         self.good("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "b.exr",
-                  "--denoise", "balanced", *PLAIN, "--guides", "a.exr", "--quiet", "--error")
+                  "--denoise", "balanced", *PLAIN, "--features", "a.exr", "--quiet", "--error")
         self.same("a.exr", "b.exr")
         self.assertTrue({"StdError.G", "Bias.G"} <= self.channels("b.exr"))
         names = ["sharp", "sharp-independent", "smooth", "demodulated"]
         self.assertEqual({p.name for p in (self.path / "steps").iterdir()},
                          {f"{kind}-{name}.{end}" for kind in ("candidate", "weight") for name in names
                           for end in ("exr", "png")})
-        # Without guides it is another image.
+        # Without features it is another image.
         self.good("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "c.exr",
                   "--denoise", "balanced", *PLAIN, "--quiet")
         self.assertNotEqual((self.path / "b.exr").read_bytes(), (self.path / "c.exr").read_bytes())
@@ -92,7 +92,7 @@ class Denoise(RenderTest):
         self.same("a.exr", "b.exr")
         self.good("render", ROOM, *SMALL, "-o", "c.exr", *options, "--passes", "films", "--resume")
         self.same("a.exr", "c.exr")
-        self.assertNotIn("Albedo.R", self.channels("a.exr"), "guides are only written where --aovs asks for them")
+        self.assertNotIn("Albedo.R", self.channels("a.exr"), "features are only written where --aovs asks for them")
         info = json.loads(self.good("info", "a.exr", "--json").stdout)
         self.assertEqual(info["attributes"]["covary:estimator"], "iicv --denoise error --oidn off")
 
@@ -117,8 +117,9 @@ class Denoise(RenderTest):
                  "--denoise", "error", "--oidn", "/nowhere/lib.so", "--spp", "24")
         self.good("render", ROOM, *SMALL, "-o", "b.exr", *IICV, "--spp", "24", "--passes", "films")
         inputs = ("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "c.exr")
-        self.bad(1, "--guides 'b.exr' has no layer Albedo", *inputs, "--denoise", "error", *PLAIN, "--guides", "b.exr")
-        self.bad(2, "--guides is an option of --denoise", *inputs, *IICV, "--guides", "b.exr")
+        self.bad(1, "--features 'b.exr' has no layer Albedo", *inputs, "--denoise", "error", *PLAIN, "--features",
+                 "b.exr")
+        self.bad(2, "--features is an option of --denoise", *inputs, *IICV, "--features", "b.exr")
         size = struct.unpack("<4i", header((self.path / "b.exr").read_bytes())[0]["dataWindow"])
         width, height = size[2] + 1, size[3] + 1
         for value in (math.nan, math.inf, -math.inf):
@@ -126,17 +127,18 @@ class Denoise(RenderTest):
                       for c in names}
             for name, layer in (("Albedo.G", "Albedo"), ("N.X", "N")):
                 bad = {**layers, name: [0.5] * (width + 3) + [value] + [0.5] * (width * (height - 1) - 4)}
-                self.write("guides.exr", exr({**bad, **{c: [0.5] * (width * height) for c in "RGB"}}, (width, height)))
-                said = self.good(*inputs, "--denoise", "error", *PLAIN, "--guides", "guides.exr").stderr
-                self.assertIn(f"guides.exr: the layer {layer}: 1 of {width * height} pixels of this feature are left "
+                grey = {c: [0.5] * (width * height) for c in "RGB"}
+                self.write("features.exr", exr({**bad, **grey}, (width, height)))
+                said = self.good(*inputs, "--denoise", "error", *PLAIN, "--features", "features.exr").stderr
+                self.assertIn(f"features.exr: the layer {layer}: 1 of {width * height} pixels of this feature are left "
                               f"out, the first with the value {value} at (3, 1)", said)
             seen = {f"{layer}.{c}": [0.5] * (width * height) for layer, names in (("DenoisingAlbedo", "RGB"),
                                                                                  ("DenoisingNormal", "XYZ"))
                     for c in names} | {"DenoisingNormal.Y": [value] * (width * height)}
-            self.write("guides.exr", exr({**layers, **seen, **{c: [0.5] * (width * height) for c in "RGB"}},
+            self.write("features.exr", exr({**layers, **seen, **{c: [0.5] * (width * height) for c in "RGB"}},
                                          (width, height)))
-            said = self.good(*inputs, "--denoise", "error", *PLAIN, "--guides", "guides.exr").stderr
-            self.assertIn(f"guides.exr: the layer DenoisingNormal: {width * height} of {width * height} pixels", said)
+            said = self.good(*inputs, "--denoise", "error", *PLAIN, "--features", "features.exr").stderr
+            self.assertIn(f"features.exr: the layer DenoisingNormal: {width * height} of {width * height} pixels", said)
         self.bad(2, "--explain: a pixel that is denoised", *inputs, "--denoise", "error", *PLAIN, "--explain", "1,1")
 
     def test_single_pass(self):
@@ -151,7 +153,7 @@ class Denoise(RenderTest):
         self.assertLess(self.relmse("a.exr", "r.exr"), 0.5 * self.relmse("plain.exr", "r.exr"))
         # The independent film alone.
         alone = ("combine", "--independent", "films/independent.exr", "-o", "b.exr", "--quiet", "--error")
-        self.good(*alone, "--denoise", "error", *PLAIN, "--guides", "a.exr")
+        self.good(*alone, "--denoise", "error", *PLAIN, "--features", "a.exr")
         self.same("a.exr", "b.exr")
         self.bad(2, "without --crn, independent images can only be denoised", *alone, "--denoise", "none")
         self.bad(2, "--estimator iicv needs the image with common random numbers, --crn", *alone, "--denoise", "error",
@@ -172,16 +174,17 @@ class Denoise(RenderTest):
                  "copy.exr", "-o", "e.exr", *PLAIN)
 
     def test_positions(self):
-        """Guide filters, from films and from files of guides."""
+        """Filters with features, from films and from files of features."""
         self.good("render", ROOM, *SMALL, "-o", "film.exr", "--estimator", "none", "--spp", "8", "--groups", "4",
                   "--aovs")
         self.good("denoise", "film.exr", "-o", "a.exr", "--albedo", "Albedo", "--normal", "N", *PLAIN, "--quiet")
         data = (self.path / "film.exr").read_bytes()
         size = struct.unpack("<4i", header(data)[0]["dataWindow"])
         for layers in (("Albedo", "N", "P"), ("Albedo", "N")):
-            guides = {name: values for name, values in read_exr(data).items() if name.split(".")[0] in layers}
-            self.write("guides.exr", exr(guides | {c: guides["Albedo.R"] for c in "RGB"}, (size[2] + 1, size[3] + 1)))
-            self.good("combine", "--independent", "film.exr", "--guides", "guides.exr", "-o", "b.exr", "--denoise",
+            features = {name: values for name, values in read_exr(data).items() if name.split(".")[0] in layers}
+            rgb = {c: features["Albedo.R"] for c in "RGB"}
+            self.write("features.exr", exr(features | rgb, (size[2] + 1, size[3] + 1)))
+            self.good("combine", "--independent", "film.exr", "--features", "features.exr", "-o", "b.exr", "--denoise",
                       "auto", *PLAIN, "--quiet")
             if "P" in layers:
                 self.same("a.exr", "b.exr")
@@ -271,7 +274,7 @@ class Denoise(RenderTest):
             self.assertIn("guided by albedo and normal", said, renderer)
             results.add(tuple(read_exr((self.path / f"{renderer}.exr").read_bytes())[channels(picture)[0]]))
         self.assertEqual(len(results), 1, "the same pixels by every renderer's names")
-        # Guides by name, and in files of their own as LuxCore writes them.
+        # Features by name, and in files of their own as LuxCore writes them.
         self.write("albedo.exr", exr({c: albedo for c in "RGB"}, size))
         two = ("denoise", "mitsuba0.exr", "mitsuba1.exr", "-o", "a.exr", *PLAIN)
         said = self.good(*two, "--albedo", "albedo.exr", "--normal", "sh_normal").stderr
@@ -279,7 +282,7 @@ class Denoise(RenderTest):
         self.bad(1, "no layer 'albdo'; did you mean 'albedo'?", *two, "--albedo", "albdo")
         self.write("small.exr", exr({c: [0.5] * 6 for c in "RGB"}, (3, 2)))
         self.bad(1, "mitsuba0.exr has a frame of 48 x 32 pixels, small.exr one of 3 x 2", *two, "--albedo", "small.exr")
-        self.bad(2, "--albedo and --normal have no effect with --no-guides", *two, "--no-guides", "--albedo", "x")
+        self.bad(2, "--albedo and --normal have no effect with --no-features", *two, "--no-features", "--albedo", "x")
         # A larger data window in a frame of the same size, and one that lacks pixels.
         self.good(*two, "--albedo", "albedo.exr", "--normal", "sh_normal")
         placed = (self.path / "a.exr").read_bytes()
@@ -375,7 +378,7 @@ class Denoise(RenderTest):
                 self.assertAlmostEqual(whole, sum(parts), delta=1e-5 * (1 + abs(whole)))
 
     def test_runs_of_the_network(self):
-        """Three images, of all samples and of both halves; and two guides where these have noise."""
+        """Three images, of all samples and of both halves; and two features where these have noise."""
         for options in ((), (*IICV, "--denoise", "error")):
             runs = self.path / "runs"
             self.good("render", ROOM, *SMALL, "-o", "a.exr", "--spp", "24", *options, "--json", "a.json", "--oidn",
@@ -452,15 +455,15 @@ class Denoise(RenderTest):
         self.assertNotIn("note", facts)
         self.assertEqual(facts["samples_per_pixel"], 4)
 
-    def test_clean_guides(self):
-        self.bad(2, "--clean-guides has no effect with --no-guides", "denoise", "a.exr", "-o", "b.exr",
-                 "--clean-guides", "--no-guides")
+    def test_clean_features(self):
+        self.bad(2, "--clean-features has no effect with --no-features", "denoise", "a.exr", "-o", "b.exr",
+                 "--clean-features", "--no-features")
         if self.run_covary("denoise", "--check").returncode != 0:
             return
         self.good("render", ROOM, *SMALL, "-o", "r.exr", "--estimator", "none", "--spp", "512", "--seed", "9")
         self.good("render", ROOM, *SMALL, "-o", "a.exr", "--estimator", "none", "--spp", "8", "--aovs")
         self.good("denoise", "a.exr", "-o", "plain.exr", "--quiet")
-        self.good("denoise", "a.exr", "-o", "clean.exr", "--clean-guides", "--quiet")
+        self.good("denoise", "a.exr", "-o", "clean.exr", "--clean-features", "--quiet")
         self.assertNotEqual((self.path / "plain.exr").read_bytes(), (self.path / "clean.exr").read_bytes())
         self.assertLess(self.relmse("clean.exr", "r.exr"), self.relmse("a.exr", "r.exr"))
 

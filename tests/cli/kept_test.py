@@ -131,7 +131,7 @@ class Results(KeptTest):
                  "b.exr", "-o", "o.exr")
 
 
-    def test_guides_in_other_colours_are_converted(self):
+    def test_features_in_other_colours_are_converted(self):
         """Albedos in files of their own, in Rec. 709, guide as those of the picture's space do."""
         here = [((0.8, 0.3, 0.2), (0.2, 0.4, 0.7))[x // 3 % 2] for _ in range(SIZE[1]) for x in range(SIZE[0])]
         there = [in_rec709(colour) for colour in here]
@@ -152,7 +152,7 @@ class Results(KeptTest):
             return [v for c in "RGB" for v in found[c]]
 
         for command, option in ((("denoise", "1.exr", "2.exr"), "--albedo"),
-                                (("combine", "--independent", "1.exr", "2.exr", "--denoise", "auto"), "--guides")):
+                                (("combine", "--independent", "1.exr", "2.exr", "--denoise", "auto"), "--features")):
             own = result(*command, *(() if option == "--albedo" else (option, "1.exr")))
             converted, as_stored = (result(*command, option, name) for name in ("rec709.exr", "untold.exr"))
             self.assertLess(max(abs(x - y) for x, y in zip(own, converted)), 1e-3 * max(own), option)

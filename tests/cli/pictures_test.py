@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files as other renderers name their layers: the picture among views, view layers, mattes and lights; its guides; what
-the rest of a file must not stop."""
+"""Files as other renderers name their layers: the picture among views, view layers, mattes and lights; its features;
+what the rest of a file must not stop."""
 import array
 import json
 import math
@@ -146,7 +146,7 @@ class Views(PicturesTest):
                   "c.exr")
         self.assertEqual(self.read("c.exr")["right.R"], found["right.R"])
 
-    def test_view_layers_have_their_own_guides(self):
+    def test_view_layers_have_their_own_features(self):
         self.pair(lambda seed: {**colours("A.Combined", noisy(seed)), **colours("B.Combined", noisy(10 + seed)),
                                 **colours("B.Denoising Albedo", floats([0.5] * N))})
         said = self.denoise()
@@ -200,7 +200,7 @@ def parts_values(path, number):
 
 
 class WrongValues(PicturesTest):
-    def test_in_guides_are_left_out(self):
+    def test_in_features_are_left_out(self):
         for value in (math.nan, math.inf):
             def make(seed):
                 normal, position = [0.5] * N, floats([1.0] * N)

@@ -99,7 +99,7 @@ class Plans(RenderTest):
         self.same("a.exr", "b.exr")
         self.good("combine", "--independent", "films/independent.exr", "-o", "c.exr", "--denoise", "auto", "--oidn",
                   "off", "--quiet")
-        self.assertGreater(self.relmse("c.exr", "a.exr"), 0, "without guides")
+        self.assertGreater(self.relmse("c.exr", "a.exr"), 0, "without features")
         said = self.good("render", ROOM, *SMALL[:2], "-o", "b.exr", *default, "--verbose").stderr
         self.assertRegex(said, r"(?m)^predicted relMSE 0\.0\d+, .*\d+ % of it squared bias; the mean of the samples "
                                r"has 0\.")

@@ -401,7 +401,7 @@ class Combine(SequenceTest):
             self.assertEqual(json.loads((self.path / f"c_{frame}.json").read_text())["output"], f"c_{frame}.exr")
 
     def test_history(self):
-        denoised = ("--denoise", "auto", "--oidn", "off", "--guides", "o_#.exr")
+        denoised = ("--denoise", "auto", "--oidn", "off", "--features", "o_#.exr")
         self.good_combine("-o", "on_#.exr", *denoised)
         self.good_combine("-o", "alone_#.exr", *denoised, "--no-history")
         self.good_combine("-o", "part_#.exr", *denoised, "--frames", "2-3")

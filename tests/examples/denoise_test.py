@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/examples/denoise_*.py: covary denoise takes what each renders, with its guides. Needs the renderer's module."""
+"""docs/examples/denoise_*.py: covary denoise takes what each renders, with its features.
+Needs the renderer's module."""
 import os
 import subprocess
 import sys
@@ -71,8 +72,8 @@ class Denoise(unittest.TestCase):
 
     def test_example(self):
         self.run_in_folder(sys.executable, SOURCE / f"docs/examples/denoise_{RENDERER}.py", self.scene(), 8)
-        guides = ("--albedo", "a.albedo.exr", "--normal", "a.normal.exr") if RENDERER == "luxcore" else ()
-        said = self.run_in_folder(COVARY, "denoise", "a.exr", "b.exr", *guides, "-o", "out.exr", "--oidn", "off")
+        features = ("--albedo", "a.albedo.exr", "--normal", "a.normal.exr") if RENDERER == "luxcore" else ()
+        said = self.run_in_folder(COVARY, "denoise", "a.exr", "b.exr", *features, "-o", "out.exr", "--oidn", "off")
         self.assertIn("of 2 renders, guided by albedo and normal", said)
 
     def test_more_renders(self):

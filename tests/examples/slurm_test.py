@@ -60,7 +60,7 @@ class Cluster(unittest.TestCase):
         return self.run_in_folder(SCRIPT, ROOM, "out.exr", samples, tasks, *SMALL, *options, **keywords)
 
     def check_result(self, samples):
-        """The mean has the bits of one machine; out.exr knows the guides."""
+        """The mean has the bits of one machine; out.exr knows the features."""
         films = [f"{seed}.exr" for seed in range(1, TASKS + 1)]
         for seed, film in enumerate(films, 1):
             self.run_in_folder(COVARY, "render", ROOM, "-o", film, "--estimator", "none", "--aovs", "--seed", seed,

@@ -569,7 +569,8 @@ class Foreign(ExperimentTest):
     def test_commands_after_the_render(self):
         for step, place, message in ((["denoise", "--oidn", "evil.so"], "[0][1]", "--oidn 'evil.so' names a library"),
                                      (["combine", "--crn", "x", "--light", "y"], "[0][1]", "--crn 'x' names a file"),
-                                     (["combine", "--force", "--guides", "x"], "[0][2]", "--guides 'x' names a file"),
+                                     (["combine", "--force", "--features", "x"], "[0][2]",
+                                      "--features 'x' names a file"),
                                      (["convert", "x.exr"], "[0][0]", "-o"),
                                      (["denoise", "-o", "x"], "[0][1]", "-o 'x' names a file"),
                                      (["view", "--quiet"], "[0][0]", "--quiet"),
@@ -580,7 +581,7 @@ class Foreign(ExperimentTest):
 
     def test_values_are_allowed(self):
         self.suite["methods"].append(
-            {"name": "all", "then": [["denoise", "--clean-guides"]],
+            {"name": "all", "then": [["denoise", "--clean-features"]],
              "options": ["--denoise", "balanced", "--oidn", "off", "--split", "1:3", "--until", "relmse=0.1", "--crop",
                          "0,0,8,8", "-D", "a=b", "--set", "k=3", "--integrator", "path", "--aovs"]})
         done = self.run_covary(self.command("--print"))

@@ -212,10 +212,10 @@ class Arguments(PackageTest):
         """What must be given, too, so that the argument has an effect."""
         if not function.startswith("covary.") or function.count(".") > 1 or function == "covary.denoise":
             return {}
-        guides = {"denoise": "balanced", "oidn": "off"}
-        return {"albedo": guides, "normal": {**guides, "albedo": self.crn[0]}, "denoising_albedo": guides,
-                "denoising_normal": {**guides, "denoising_albedo": self.crn[0]},
-                "position": {**guides, "albedo": self.crn[0]}, "oidn": {"denoise": "balanced"},
+        features = {"denoise": "balanced", "oidn": "off"}
+        return {"albedo": features, "normal": {**features, "albedo": self.crn[0]}, "denoising_albedo": features,
+                "denoising_normal": {**features, "denoising_albedo": self.crn[0]},
+                "position": {**features, "albedo": self.crn[0]}, "oidn": {"denoise": "balanced"},
                 "counts": {"samples": 24}}.get(name, {})
 
     def refused(self, function, call, given, name, value):
@@ -307,10 +307,10 @@ class Arguments(PackageTest):
                          "file, and covary comes with no scene of that name, but with .*room")
 
     def test_options_of_combining_are_arguments(self):
-        """All that the library declares, under their names but for these; guides are five images, and some are of files
-        and of the program alone."""
+        """All that the library declares, under their names but for these; features are five images, and some are of
+        files and of the program alone."""
         declared = {option["name"].replace("-", "_"): option for option in covary._covary.combine_options()}
-        other = {"error": ["std_error"], "guides": ["albedo", "normal", "denoising_albedo", "denoising_normal",
+        other = {"error": ["std_error"], "features": ["albedo", "normal", "denoising_albedo", "denoising_normal",
                                                   "position"]}
         files = {"output", "crn_layer", "independent_layer", "explain", "memory"}
         arguments = inspect.signature(covary.combine).parameters

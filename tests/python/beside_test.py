@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What may come beside two images: light films, numbers of samples, denoising with guides. Values and messages of the
+"""What may come beside two images: light films, numbers of samples, denoising with features. Values and messages of the
 command line."""
 import math
 import os
@@ -117,22 +117,22 @@ class Denoise(BesideTest):
         self.assertEqual(result.estimator, "iicv --denoise error --oidn off")
         self.assert_same_bits(result.image, covary.iicv(*self.images, **options).image)
 
-    def write_guides(self, names, images):
-        self.write("guides", {f"{name}.{c}": image[:, :, i] for name, image in zip(names, images)
+    def write_features(self, names, images):
+        self.write("features", {f"{name}.{c}": image[:, :, i] for name, image in zip(names, images)
                               for i, c in enumerate("XYZ" if name.endswith(("N", "Normal", "P")) else "RGB")})
 
-    def test_guides_behind_glass(self):
+    def test_features_behind_glass(self):
         """Go to the network in place of the others."""
         denoiser = os.environ["STAND_IN_DENOISER"]
         first = {"albedo": self.albedo, "normal": self.normal}
         behind = {"denoising_albedo": self.albedo[::-1].copy(), "denoising_normal": self.normal[::-1].copy()}
-        self.write_guides(("Albedo", "N", "DenoisingAlbedo", "DenoisingNormal"), (*first.values(), *behind.values()))
+        self.write_features(("Albedo", "N", "DenoisingAlbedo", "DenoisingNormal"), (*first.values(), *behind.values()))
         result = covary.combine(*self.images, denoise="error", oidn=denoiser, **first, **behind)
         self.assertFalse((result.image == covary.combine(*self.images, denoise="error", oidn=denoiser,
                                                          **first).image).all())
-        self.assert_program_has(result, "--denoise", "error", "--oidn", denoiser, "--guides", "guides.exr")
-        said = [self.message_of(covary.UsageError, covary.combine, *self.images, denoise="error", **guides)
-                for guides in ({"denoising_normal": self.normal}, {**first, "denoising_albedo": self.albedo})]
+        self.assert_program_has(result, "--denoise", "error", "--oidn", denoiser, "--features", "features.exr")
+        said = [self.message_of(covary.UsageError, covary.combine, *self.images, denoise="error", **features)
+                for features in ({"denoising_normal": self.normal}, {**first, "denoising_albedo": self.albedo})]
         self.assertEqual(said, ["denoising_normal: it has an effect only together with denoising_albedo",
                                 "denoising_albedo: it has an effect only together with denoising_normal"])
 
@@ -145,17 +145,17 @@ class Denoise(BesideTest):
         self.assertEqual(list(result.aovs), ["Rest", "half", "third"])
         numpy.testing.assert_allclose(sum(result.aovs.values()), result.image, rtol=1e-5, atol=1e-6)
         numpy.testing.assert_allclose(result.aovs["half"], 0.5 * result.image, rtol=1e-4, atol=1e-5)
-        self.write_guides(("Albedo", "N"), (self.albedo, self.normal))
+        self.write_features(("Albedo", "N"), (self.albedo, self.normal))
         self.run_program("combine", "--independent", "independent.exr", "-o", "out.exr", "--denoise", "auto",
-                         "--oidn", "off", "--guides", "guides.exr", "--quiet", "--error")
+                         "--oidn", "off", "--features", "features.exr", "--quiet", "--error")
         self.assert_same_bits(result.image.reshape(-1, 3), rgb(self.path / "out.exr"))
         position = numpy.stack([self.normal[..., 0], *numpy.mgrid[:HEIGHT, :WIDTH]], -1).astype(numpy.float32)
         placed = covary.combine(None, independent, denoise="auto", oidn="off", albedo=self.albedo, normal=self.normal,
                                 position=position)
         self.assertFalse((placed.image == result.image).all())
-        self.write_guides(("Albedo", "N", "P"), (self.albedo, self.normal, position))
+        self.write_features(("Albedo", "N", "P"), (self.albedo, self.normal, position))
         self.run_program("combine", "--independent", "independent.exr", "-o", "out.exr", "--denoise", "auto",
-                         "--oidn", "off", "--guides", "guides.exr", "--quiet", "--error")
+                         "--oidn", "off", "--features", "features.exr", "--quiet", "--error")
         self.assert_same_bits(placed.image.reshape(-1, 3), rgb(self.path / "out.exr"))
         self.assertEqual(self.message_of(covary.UsageError, covary.combine, None, independent, denoise="auto",
                                          position=position),
@@ -171,9 +171,9 @@ class Denoise(BesideTest):
     def test_messages(self):
         def message(error, estimator="iicv", **keywords):
             return self.message_of(error, covary.combine, *self.images, estimator, **keywords)
-        self.write("guides", {f"Albedo.{c}": self.albedo[:, :, i] for i, c in enumerate("RGB")})
+        self.write("features", {f"Albedo.{c}": self.albedo[:, :, i] for i, c in enumerate("RGB")})
         self.assertIn("option of --denoise auto, bias", self.failure_of_program(*FILES, "--estimator", "iicv",
-                                                                            "--guides", "guides.exr"))
+                                                                            "--features", "features.exr"))
         self.assertIn("albedo: auxiliary features are for denoising",
                       message(covary.UsageError, albedo=self.albedo))
         self.assertEqual(message(covary.UsageError, oidn="off"),
@@ -184,12 +184,12 @@ class Denoise(BesideTest):
         self.assertIn("only together with the albedo", message(covary.UsageError, denoise="bias", normal=self.normal))
         self.assertIn("albedo: found the shape [19, 24, 3]; expected [20, 24, 3]",
                       message(ValueError, denoise="bias", albedo=self.albedo[1:]))
-        for guide in ("albedo", "normal"):
-            guides = {"albedo": self.albedo, "normal": self.normal}
-            guides[guide] = guides[guide].copy()
-            guides[guide][2, 5, 1] = math.nan
-            self.assertIn(f"the {guide} holds the value nan at pixel (5, 2); all values of auxiliary features must be "
-                          "finite", message(covary.InputError, denoise="bias", oidn="off", **guides))
+        for feature in ("albedo", "normal"):
+            features = {"albedo": self.albedo, "normal": self.normal}
+            features[feature] = features[feature].copy()
+            features[feature][2, 5, 1] = math.nan
+            self.assertIn(f"the {feature} holds the value nan at pixel (5, 2); all values of auxiliary features must "
+                          "be finite", message(covary.InputError, denoise="bias", oidn="off", **features))
         self.assertIn("blured", message(covary.UsageError, denoise="blured"))
 
     def test_render(self):

@@ -186,7 +186,7 @@ class Cluster(PackageTest):
         self.assertIn("n: found -1", self.message_of(ValueError, self.client.run, covary.set_threads, -1))
 
     def test_denoised(self):
-        """With guides that the workers render, and the denoiser of the frame, not of tiles."""
+        """With features that the workers render, and the denoiser of the frame, not of tiles."""
         here = covary.render(self.scene(), 48, "iicv", denoise="error", oidn="off")
         there = covary.distributed.render(self.client, self.scene(), 48, "iicv", tile=30, denoise="error", oidn="off")
         self.assert_same_bits(here.image, there.image)

@@ -129,7 +129,7 @@ class Render(WithMitsuba):
             self.assertGreater(result.aovs["Albedo"].mean(), 0.2)
             self.assertAlmostEqual(float(numpy.linalg.norm(result.aovs["N"], axis=-1).max()), 1, delta=0.05)
 
-    def test_guides_behind_glass(self):
+    def test_features_behind_glass(self):
         """A pane in front of a wall: the pane's own, which has no albedo, and the wall's in the colour of the glass."""
         place = self.mi.ScalarTransform4f
         scene = self.scene_with({"type": "box"})

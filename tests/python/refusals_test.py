@@ -30,12 +30,12 @@ class Refusals(PackageTest):
 
     def test_misspelt_arguments(self):
         """Whatever their value is."""
-        guide = numpy.ones(INDEPENDENT.shape[1:], numpy.float32)
-        for value in (guide, 3, "text"):
+        feature = numpy.ones(INDEPENDENT.shape[1:], numpy.float32)
+        for value in (feature, 3, "text"):
             self.assertIn("albdo: there is no such argument; did you mean albedo?",
                           self.message_of(covary.UsageError, covary.combine, None, INDEPENDENT, albdo=value))
         self.assertIn("something: there is no such argument",
-                      self.message_of(covary.UsageError, covary.combine, None, INDEPENDENT, something=guide))
+                      self.message_of(covary.UsageError, covary.combine, None, INDEPENDENT, something=feature))
 
         self.assertIn("did you mean spp?", self.message_of(covary.UsageError, covary.render, "room", ssp=8))
 

@@ -14,25 +14,25 @@ namespace covary {
 
 /// Albedo and normal of the first surface that is not a mirror or glass, or else of the first one; position of the
 /// first one.
-enum class GuideKind { kAlbedo, kNormal, kPosition };
+enum class FeatureKind { kAlbedo, kNormal, kPosition };
 
-/// The guide layer of the image at `path` by the renderers' names (table in docs/other-renderers.md), of the picture's
-/// view and view layer; if there are several, the first in the table. An albedo is converted to `colours`, the space of
-/// the picture. Pixels with values that are not finite are told as a warning, and become NaN. Throws like
-/// read_image().
-std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, GuideKind kind,
-                                const ColourSpace& colours, const Picture& picture = {});
+/// The feature layer of the image at `path` by the renderers' names (table in docs/other-renderers.md), of the
+/// picture's view and view layer; if there are several, the first in the table. An albedo is converted to `colours`,
+/// the space of the picture. Pixels with values that are not finite are told as a warning, and become NaN. Throws
+/// like read_image().
+std::optional<Image> find_feature(const std::string& path, const ImageInfo& info, FeatureKind kind,
+                                  const ColourSpace& colours, const Picture& picture = {});
 
-/// A guide named by the user, likewise: a layer of the image at `path`, or a separate file, whose frame must have the
+/// A feature named by the user, likewise: a layer of the image at `path`, or a separate file, whose frame must have the
 /// same size; of a larger data window, the pixels of the image. Throws like read_image() and common_window().
-Image named_guide(const std::string& path, const ImageInfo& info, GuideKind kind, const ColourSpace& colours,
-                  const std::string& layer_or_file);
+Image named_feature(const std::string& path, const ImageInfo& info, FeatureKind kind, const ColourSpace& colours,
+                    const std::string& layer_or_file);
 
 /// The image with 0 in place of NaN.
-std::optional<Image> filled(std::optional<Image> guide);
+std::optional<Image> filled(std::optional<Image> feature);
 
 /// The mean of images, in which pixels that are NaN count as missing; 0 where all are.
-class MeanGuide {
+class MeanFeature {
  public:
   /// Throws Error(kInput), naming the file, if the size differs.
   void add(const std::string& path, std::optional<Image> image);
@@ -43,26 +43,26 @@ class MeanGuide {
   std::vector<uint16_t> n_;  // of each pixel
 };
 
-/// The layers of --guides.
-struct GuideImages {
+/// The layers of --features.
+struct FeatureImages {
   std::optional<Image> albedo, normal;                      // first hits, if the file has both
   std::optional<Image> denoising_albedo, denoising_normal;  // first rough surfaces behind mirrors and glass
   bool clean = false;                                       // without noise, as in covary's own films
   std::optional<Image> position;
-  Guides view() const {
+  Features view() const {
     const auto or_null = [](const std::optional<Image>& image) { return image ? &*image : nullptr; };
-    Guides guides{or_null(albedo),           or_null(normal),   or_null(denoising_albedo),
-                  or_null(denoising_normal), or_null(position), clean};
-    if (!albedo) guides.normal = nullptr;
-    return guides;
+    Features features{or_null(albedo),           or_null(normal),   or_null(denoising_albedo),
+                      or_null(denoising_normal), or_null(position), clean};
+    if (!albedo) features.normal = nullptr;
+    return features;
   }
 };
 
 /// Throws Error(kInput) if the file has no albedo, or other pixels than `place`.
-GuideImages read_guides(const std::string& path, const ImagePlace& place, const ColourSpace& colours);
+FeatureImages read_features(const std::string& path, const ImagePlace& place, const ColourSpace& colours);
 
-/// What finds the guides of a picture in several renders of it.
-struct GuideSearch {
+/// What finds the features of a picture in several renders of it.
+struct FeatureSearch {
   std::vector<std::string> files;
   Picture picture;
   ColourSpace colours;         ///< of the picture
@@ -70,12 +70,12 @@ struct GuideSearch {
   bool none = false;
 };
 
-/// The guides of a picture, each the mean over the files that have it.
-struct GuideLayers {
+/// The features of a picture, each the mean over the files that have it.
+struct FeatureLayers {
   std::optional<Image> albedo, normal, position;
 
-  explicit GuideLayers(const GuideSearch& search);
-  Guides view() const;
+  explicit FeatureLayers(const FeatureSearch& search);
+  Features view() const;
   const char* text() const;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "guide_layer.h"
+#include "feature_layers.h"
 
 #include <fmt/format.h>
 
@@ -19,13 +19,13 @@
 namespace covary {
 namespace {
 
-const AuxiliaryFeature& feature_of(GuideKind kind) {
+const AuxiliaryFeature& feature_of(FeatureKind kind) {
   switch (kind) {
-    case GuideKind::kAlbedo:
+    case FeatureKind::kAlbedo:
       return kAuxiliaryFeatures[feature::kAlbedo];
-    case GuideKind::kNormal:
+    case FeatureKind::kNormal:
       return kAuxiliaryFeatures[feature::kNormal];
-    case GuideKind::kPosition:
+    case FeatureKind::kPosition:
       break;
   }
   return kAuxiliaryFeatures[feature::kPosition];
@@ -37,52 +37,52 @@ bool has_three_channels(const std::string& path, const ImageInfo& info, const st
 }
 
 /// Reports the first value that is not finite, and makes all such pixels NaN.
-void leave_out_bad_pixels(const std::string& name, Image& guide) {
+void leave_out_bad_pixels(const std::string& name, Image& feature) {
   size_t n = 0;
   std::string first;
-  for (size_t i = 0; i < guide.data.size(); i += 3) {
-    float* pixel = &guide.data[i];
+  for (size_t i = 0; i < feature.data.size(); i += 3) {
+    float* pixel = &feature.data[i];
     const float* bad = std::find_if(pixel, pixel + 3, [](float v) { return !std::isfinite(v); });
     if (bad == pixel + 3) continue;
     if (n++ == 0) {
       const auto at = static_cast<int>(i / 3);
-      first = fmt::format("{} at ({}, {})", *bad, at % guide.width, at / guide.width);
+      first = fmt::format("{} at ({}, {})", *bad, at % feature.width, at / feature.width);
     }
     std::fill_n(pixel, 3, std::numeric_limits<float>::quiet_NaN());
   }
   if (n > 0)
     fmt::print(stderr, "warning: {}: {} of {} pixels of this feature are left out, the first with the value {}\n",
-               printable(name), n, guide.data.size() / 3, first);
+               printable(name), n, feature.data.size() / 3, first);
 }
 
-/// The space to convert a guide to; none for vectors, even if their components are called R, G and B.
-std::optional<ColourSpace> space_of(GuideKind kind, const ColourSpace& colours) {
+/// The space to convert a feature to; none for vectors, even if their components are called R, G and B.
+std::optional<ColourSpace> space_of(FeatureKind kind, const ColourSpace& colours) {
   return feature_of(kind).is_colour ? std::optional(colours) : std::nullopt;
 }
 
-Image usable_guide(const std::string& path, const std::string& layer, const std::optional<ColourSpace>& colours) {
-  Image guide = read_image(path, layer, ChecksumPolicy::kCheck, colours).image;
-  leave_out_bad_pixels(path + (layer.empty() ? "" : ": the layer " + layer), guide);
-  return guide;
+Image usable_feature(const std::string& path, const std::string& layer, const std::optional<ColourSpace>& colours) {
+  Image feature = read_image(path, layer, ChecksumPolicy::kCheck, colours).image;
+  leave_out_bad_pixels(path + (layer.empty() ? "" : ": the layer " + layer), feature);
+  return feature;
 }
 
 /// The pixels of the image at `path` in a separate file.
-Image guide_from_file(const std::string& path, const ImagePlace& place, const std::string& file,
-                      const std::optional<ColourSpace>& colours) {
-  PlacedImage guide = read_image(file, "", ChecksumPolicy::kCheck, colours);
-  const CropWindow common = common_window(path, place, place.window, file, guide.place);
+Image feature_from_file(const std::string& path, const ImagePlace& place, const std::string& file,
+                        const std::optional<ColourSpace>& colours) {
+  PlacedImage feature = read_image(file, "", ChecksumPolicy::kCheck, colours);
+  const CropWindow common = common_window(path, place, place.window, file, feature.place);
   if (!(common == place.window))
     throw Error(ErrorCode::kInput, fmt::format("'{}' has the pixels {}; '{}' needs {}", file,
-                                               text_of(guide.place.window), path, text_of(place.window)));
-  Image pixels = cut(std::move(guide), place.window);
+                                               text_of(feature.place.window), path, text_of(place.window)));
+  Image pixels = cut(std::move(feature), place.window);
   leave_out_bad_pixels(file, pixels);
   return pixels;
 }
 
 }  // namespace
 
-std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, GuideKind kind,
-                                const ColourSpace& colours, const Picture& picture) {
+std::optional<Image> find_feature(const std::string& path, const ImageInfo& info, FeatureKind kind,
+                                  const ColourSpace& colours, const Picture& picture) {
   const AuxiliaryFeature& first = feature_of(kind);
   const std::vector<std::string> layers = image_layers(info.channels);
   const auto find = [&](const AuxiliaryFeature& feature) -> std::optional<Image> {
@@ -90,7 +90,7 @@ std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, 
       for (const std::string& layer : layers)
         if (last_part(without_view(layer, view_of(layer, info.channels))) == name &&
             belongs_to(picture, layer, info.channels) && has_three_channels(path, info, layer))
-          return usable_guide(path, layer, space_of(kind, colours));
+          return usable_feature(path, layer, space_of(kind, colours));
     return std::nullopt;
   };
   std::optional<Image> behind;
@@ -98,23 +98,23 @@ std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, 
   return behind ? std::move(behind) : find(first);
 }
 
-Image named_guide(const std::string& path, const ImageInfo& info, GuideKind kind, const ColourSpace& colours,
-                  const std::string& layer_or_file) {
+Image named_feature(const std::string& path, const ImageInfo& info, FeatureKind kind, const ColourSpace& colours,
+                    const std::string& layer_or_file) {
   const std::vector<std::string> layers = image_layers(info.channels);
   const bool is_layer = std::find(layers.begin(), layers.end(), layer_or_file) != layers.end();
   if (!is_layer && std::filesystem::exists(layer_or_file))
-    return guide_from_file(path, info.place, layer_or_file, space_of(kind, colours));
-  return usable_guide(path, layer_or_file, space_of(kind, colours));  // its error lists the layers
+    return feature_from_file(path, info.place, layer_or_file, space_of(kind, colours));
+  return usable_feature(path, layer_or_file, space_of(kind, colours));  // its error lists the layers
 }
 
-std::optional<Image> filled(std::optional<Image> guide) {
-  if (guide)
+std::optional<Image> filled(std::optional<Image> feature) {
+  if (feature)
     std::replace_if(
-        guide->data.begin(), guide->data.end(), [](float v) { return std::isnan(v); }, 0.0f);
-  return guide;
+        feature->data.begin(), feature->data.end(), [](float v) { return std::isnan(v); }, 0.0f);
+  return feature;
 }
 
-void MeanGuide::add(const std::string& path, std::optional<Image> image) {
+void MeanFeature::add(const std::string& path, std::optional<Image> image) {
   if (!image) return;
   if (!sum_) sum_ = Image(image->width, image->height, 3), n_.resize(image->data.size() / 3);
   if (sum_->data.size() != image->data.size() || sum_->width != image->width)
@@ -127,63 +127,64 @@ void MeanGuide::add(const std::string& path, std::optional<Image> image) {
   }
 }
 
-std::optional<Image> MeanGuide::mean() const {
+std::optional<Image> MeanFeature::mean() const {
   std::optional<Image> mean = sum_;
   for (size_t i = 0; i < n_.size(); ++i)
     for (size_t c = 3 * i; n_[i] > 1 && c < 3 * i + 3; ++c) mean->data[c] /= n_[i];
   return mean;
 }
 
-GuideImages read_guides(const std::string& path, const ImagePlace& place, const ColourSpace& colours) {
+FeatureImages read_features(const std::string& path, const ImagePlace& place, const ColourSpace& colours) {
   const ImageInfo info = inspect_image(path);
-  const auto own = [&](feature::Index index, GuideKind kind) -> std::optional<Image> {  // guides that `render` wrote
+  const auto own = [&](feature::Index index,
+                       FeatureKind kind) -> std::optional<Image> {  // features that `render` wrote
     const std::string name = kAuxiliaryFeatures[index].layer;
     const bool is_there = std::any_of(info.channels.begin(), info.channels.end(),
                                       [&](const auto& c) { return c.name.starts_with(name + "."); });
-    return is_there ? filled(named_guide(path, info, kind, colours, name)) : std::nullopt;
+    return is_there ? filled(named_feature(path, info, kind, colours, name)) : std::nullopt;
   };
-  const auto find = [&](GuideKind kind) { return filled(find_guide(path, info, kind, colours)); };
-  GuideImages guides{own(feature::kAlbedo, GuideKind::kAlbedo),
-                     own(feature::kNormal, GuideKind::kNormal),
-                     own(feature::kDenoisingAlbedo, GuideKind::kAlbedo),
-                     own(feature::kDenoisingNormal, GuideKind::kNormal),
-                     info.attributes.contains(std::string("covary:") + film_key::kCleanGuides),
-                     find(GuideKind::kPosition)};
-  if (!guides.albedo) guides.albedo = find(GuideKind::kAlbedo);
-  if (!guides.normal) guides.normal = find(GuideKind::kNormal);
-  if (!guides.albedo)
+  const auto find = [&](FeatureKind kind) { return filled(find_feature(path, info, kind, colours)); };
+  FeatureImages features{own(feature::kAlbedo, FeatureKind::kAlbedo),
+                         own(feature::kNormal, FeatureKind::kNormal),
+                         own(feature::kDenoisingAlbedo, FeatureKind::kAlbedo),
+                         own(feature::kDenoisingNormal, FeatureKind::kNormal),
+                         info.attributes.contains(std::string("covary:") + film_key::kCleanFeatures),
+                         find(FeatureKind::kPosition)};
+  if (!features.albedo) features.albedo = find(FeatureKind::kAlbedo);
+  if (!features.normal) features.normal = find(FeatureKind::kNormal);
+  if (!features.albedo)
     throw Error(ErrorCode::kInput,
-                fmt::format("--guides '{}' has no layer Albedo (Albedo.R, .G, .B) under any known name", path));
+                fmt::format("--features '{}' has no layer Albedo (Albedo.R, .G, .B) under any known name", path));
   if (const CropWindow& there = info.place.window, &here = place.window; !(info.place == place))
     throw Error(ErrorCode::kInput,
-                fmt::format("--guides '{}' has the pixels {}, the images {}, or another frame around them", path,
+                fmt::format("--features '{}' has the pixels {}, the images {}, or another frame around them", path,
                             text_of(there), text_of(here)));
-  return guides;
+  return features;
 }
 
-GuideLayers::GuideLayers(const GuideSearch& search) {
+FeatureLayers::FeatureLayers(const FeatureSearch& search) {
   if (search.none) return;
-  MeanGuide of_albedo, of_normal, of_position;
+  MeanFeature of_albedo, of_normal, of_position;
   for (const std::string& path : search.files) {
     const ImageInfo info = inspect_image(path);
-    const auto guide = [&](const std::string& name, GuideKind kind) -> std::optional<Image> {
-      if (name.empty()) return find_guide(path, info, kind, search.colours, search.picture);
-      return named_guide(path, info, kind, search.colours, name);
+    const auto feature = [&](const std::string& name, FeatureKind kind) -> std::optional<Image> {
+      if (name.empty()) return find_feature(path, info, kind, search.colours, search.picture);
+      return named_feature(path, info, kind, search.colours, name);
     };
-    of_albedo.add(path, guide(search.albedo, GuideKind::kAlbedo));
-    of_normal.add(path, guide(search.normal, GuideKind::kNormal));
-    of_position.add(path, guide("", GuideKind::kPosition));
+    of_albedo.add(path, feature(search.albedo, FeatureKind::kAlbedo));
+    of_normal.add(path, feature(search.normal, FeatureKind::kNormal));
+    of_position.add(path, feature("", FeatureKind::kPosition));
   }
   albedo = of_albedo.mean(), normal = of_normal.mean(), position = of_position.mean();
   if (!albedo) normal.reset();  // Open Image Denoise only takes normals together with an albedo
 }
 
-Guides GuideLayers::view() const {
+Features FeatureLayers::view() const {
   const auto or_null = [](const std::optional<Image>& image) { return image ? &*image : nullptr; };
   return {or_null(albedo), or_null(normal), nullptr, nullptr, or_null(position)};
 }
 
-const char* GuideLayers::text() const {
+const char* FeatureLayers::text() const {
   return normal ? "guided by albedo and normal" : albedo ? "guided by albedo" : "without auxiliary features";
 }
 
