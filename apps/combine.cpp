@@ -336,7 +336,7 @@ void run(CombineOptions o) {
   static_cast<CombineSettings&>(o) = settings_from<CombineSettings>(o.values);
   if (o.estimator == kDefaultEstimator && !o.of_estimator.empty()) {  // whose options they are
     o.estimator = kDefaultOfPairs;
-    if (!o.values.contains("denoise")) o.denoising.mode = usual_denoising(o.estimator);
+    if (!o.values.contains("denoise")) o.denoising.mode = default_denoising(o.estimator);
   }
   check_passes(o);
   o.target = gpu::Target::open(o.device);

@@ -130,7 +130,7 @@ nlohmann::ordered_json json_of(const CompareOptions& options, const std::string&
 std::vector<std::string> noise_warnings(const CompareOptions& options, const std::string& path, const Comparison& c) {
   std::vector<std::string> warnings;
   for (size_t m = 0; m < options.metrics.size(); ++m)
-    if (const MetricResult& r = c.results[m]; r.reference_error > kMostReferenceNoise * std::abs(r.value))
+    if (const MetricResult& r = c.results[m]; r.reference_error > kMaxReferenceNoise * std::abs(r.value))
       warnings.push_back(
           fmt::format("{}: the noise of the references makes the {} of {:.3g} uncertain by ±{:.2g}; "
                       "references with more samples would tell more",

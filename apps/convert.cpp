@@ -226,7 +226,7 @@ bool names_frames(const std::string& path) { return is_frame_pattern(path) && !s
 
 /// Converts numbered images, or several sequences side by side, to a video.
 void convert_to_video(const ConvertOptions& options) {
-  constexpr double kUsualRate = 24;
+  constexpr double kDefaultRate = 24;
   const std::vector<std::string> inputs(options.files.begin(), options.files.end() - 1);
   const std::string& output = options.files.back();
   for (const std::string& input : inputs)
@@ -243,7 +243,7 @@ void convert_to_video(const ConvertOptions& options) {
       inspect_image(frame_name(input, frame), options.checksums());  // before any frame is spent
     }
   outputs.writes_result(kOutput, output, OutputKind::kText, "convert", options.overwrite);
-  VideoWriter video(output, options.rate.value_or(kUsualRate));
+  VideoWriter video(output, options.rate.value_or(kDefaultRate));
   for (const int frame : frames) {
     std::vector<LoadedPicture> pictures;
     for (const std::string& input : inputs) read_pictures(options, frame_name(input, frame), pictures);

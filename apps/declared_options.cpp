@@ -13,7 +13,7 @@
 namespace covary {
 namespace {
 
-constexpr int kMostTexts = 1000;  ///< upper bound on values of a repeatable option
+constexpr int kMaxTexts = 1000;  ///< upper bound on values of a repeatable option
 
 /// "--cv-grid", "-o,--output".
 std::string names_of(const Option& option) {
@@ -60,7 +60,7 @@ void add_option(CLI::App& command, const Option& what, OptionValues& values) {
     option->transform(checked(what));
   }
   if (what.type != Option::Type::kFlag) option->type_name(value_name(what));
-  if (what.repeats) option->expected(1, kMostTexts)->take_all();
+  if (what.repeats) option->expected(1, kMaxTexts)->take_all();
   const bool is_basic = what.level == OptionLevel::kBasic || what.group.empty();
   option->group(is_basic ? kBasicOptions : what.group);
 }

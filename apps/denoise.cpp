@@ -80,7 +80,7 @@ void warn_of_values(const std::string& path, const Image& image) {
   fmt::print(stderr,
              "warning: {}: {} of {} pixels hold values that are NaN, infinite, overflow or outshine the whole picture "
              "{:.0f} times, the first at ({}, {}); the pixels around replace them\n",
-             path, replaced.size(), image.data.size() / 3, kMostOfPicture, replaced[0].x, replaced[0].y);
+             path, replaced.size(), image.data.size() / 3, kMaxOfPicture, replaced[0].x, replaced[0].y);
 }
 
 /// One picture of the inputs: what is denoised, and where the result goes.
@@ -204,7 +204,7 @@ nlohmann::ordered_json statistics(const Options& o, const CombineRequest& reques
 Denoised denoise_by_mixture(const Options& o, const Task& task, const GroupedFile& file, ProgressLine& progress) {
   CombineRequest request;
   request.independent = source_of(file);
-  const DenoisingChoice choice{o.mode.empty() ? usual_denoising(kDefaultEstimator) : o.mode, o.oidn, {o.history}};
+  const DenoisingChoice choice{o.mode.empty() ? default_denoising(kDefaultEstimator) : o.mode, o.oidn, {o.history}};
   request.estimator = make_default_estimator(false, {}, choice);
   request.settings.std_error = true;
   const FeatureLayers features = features_of(o, task, file.colours());

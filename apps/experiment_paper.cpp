@@ -104,7 +104,7 @@ void experiment_paper(const ExperimentCommand& command, const lab::Paper& paper)
     make_output_folder(folder);
     check_files(command, part.suite, own_folder, folder);
     options.push_back(run_options(command, own_folder, {}));
-    options.back().max_pixels = lab::most_pixels(overrides_of(command, part));
+    options.back().max_pixels = lab::max_pixels(overrides_of(command, part));
     if (options.size() == 1)
       options[0].reader = std::make_shared<lab::SceneReader>(options[0].program, options[0].stop);
     options.back().reader = options[0].reader;

@@ -145,7 +145,7 @@ lab::ExperimentOptions run_options(const ExperimentCommand& command, const std::
   options.cache_folder = fs::absolute(command.cache.empty() ? command.output + "/cache" : command.cache).string();
   options.scenes_folder = scenes;
   options.context = plan_context(programs);
-  options.max_pixels = lab::most_pixels(command.overrides);
+  options.max_pixels = lab::max_pixels(command.overrides);
   options.threads = command.threads;
   options.keep_passes = command.keep_passes;
   options.part = command.the_part;

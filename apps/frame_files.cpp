@@ -111,7 +111,7 @@ std::vector<int> take_unfinished(std::vector<int>& frames, const FramePatterns& 
 
 /// Reads the headers of all files before the first frame is spent. Throws Error(kInput) naming the first problems.
 void check_frames(const std::vector<int>& frames, const FramePatterns& patterns) {
-  constexpr size_t kMostNamed = 5;
+  constexpr size_t kMaxNamed = 5;
   std::vector<std::string> problems;
   for (const std::string& pattern : read_patterns(patterns)) {
     std::optional<ImageInfo> first;
@@ -120,7 +120,7 @@ void check_frames(const std::vector<int>& frames, const FramePatterns& patterns)
         problems.push_back(std::move(problem));
   }
   if (problems.empty()) return;
-  const size_t more = problems.size() - std::min(problems.size(), kMostNamed);
+  const size_t more = problems.size() - std::min(problems.size(), kMaxNamed);
   problems.resize(problems.size() - more);
   throw Error(ErrorCode::kInput,
               fmt::format("{}{}; nothing was written. --resume leaves out frames whose files are missing or unfinished",
@@ -196,7 +196,7 @@ std::string text_of(const std::vector<int>& numbers) {
 
 /// Tells what a user may not expect: gaps between frames, and files that look like frames but are none.
 void note_gaps(const FrameOptions& o, const std::vector<int>& frames, const FramePatterns& patterns) {
-  constexpr size_t kMostNamed = 3;
+  constexpr size_t kMaxNamed = 3;
   if (o.quiet || !o.frames.empty()) return;
   std::vector<int> missing;
   for (size_t i = 1; i < frames.size(); ++i)
@@ -207,7 +207,7 @@ void note_gaps(const FrameOptions& o, const std::vector<int>& frames, const Fram
     std::vector<std::string> others;
     frames_on_disk(pattern, &others);
     if (others.empty()) continue;
-    const size_t more = others.size() - std::min(others.size(), kMostNamed);
+    const size_t more = others.size() - std::min(others.size(), kMaxNamed);
     others.resize(others.size() - more);
     fmt::print(stderr, "note: {}{} beside '{}' are not its frames: their numbers have another number of digits\n",
                fmt::join(others, ", "), more > 0 ? fmt::format(" and {} more", more) : "", pattern);

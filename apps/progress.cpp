@@ -19,7 +19,7 @@ constexpr double kTerminalSeconds = 0.2;               // between two drawings, 
 constexpr double kLogSeconds = 10, kLogGrowth = 1.35;  // until the first line of a log, and from one to the next
 constexpr double kShownSeconds = 50;                   // at most, between texts that are shown
 constexpr double kUnknown = 1e9;                       // seconds, until a time limit says more
-constexpr int kUsualColumns = 80, kBarColumns = 30;
+constexpr int kDefaultColumns = 80, kBarColumns = 30;
 
 /// The file in which a program that runs this one wants the line, as often as on a terminal; null: none.
 const char* file_of_caller() {
@@ -36,7 +36,7 @@ void write_to_caller(const std::string& line) {
 
 int terminal_columns() {
   winsize size{};
-  return ioctl(2, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : kUsualColumns;
+  return ioctl(2, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : kDefaultColumns;
 }
 
 /// The first `columns` characters of UTF-8.
@@ -128,8 +128,7 @@ void ProgressLine::toward(const PredictedError& reached) {
                          reached.bounds ? fmt::format("{:.2g} to {:.2g}", reached.bounds->low, reached.bounds->high)
                          : reached.doubt.empty() ? "predicted"
                                                  : "unreliable");
-  if (goal_ > 0)
-    least_total_ = static_cast<uint64_t>(static_cast<double>(done_) * std::max(1.0, reached.relmse / goal_));
+  if (goal_ > 0) min_total_ = static_cast<uint64_t>(static_cast<double>(done_) * std::max(1.0, reached.relmse / goal_));
 }
 
 std::string ProgressLine::note() const {
@@ -151,7 +150,7 @@ double ProgressLine::all_left(double seconds) const {
 }
 
 std::string ProgressLine::bar_text(int columns) const {
-  const uint64_t total = std::max(total_, least_total_);
+  const uint64_t total = std::max(total_, min_total_);
   const double rate = static_cast<double>(done_ - first_) / std::max(of_phase_.seconds(), 1e-9);
   const double limit_used = seconds_limit_ > 0 ? of_limit_.seconds() / seconds_limit_ : 0;
   const double done = total ? static_cast<double>(done_) / static_cast<double>(total) : 0;
@@ -185,7 +184,7 @@ void ProgressLine::draw() {
   next_ = terminal_ || file_of_caller() ? now + kTerminalSeconds : std::max(now + kLogSeconds, now * kLogGrowth);
   if (shown_) next_ = std::min(next_, now + kShownSeconds);
   const int columns = terminal_ ? terminal_columns() - 1 : 1000;  // the last column would wrap the line
-  const std::string line = cut_to(text(terminal_ ? columns : kUsualColumns + kBarColumns), columns);
+  const std::string line = cut_to(text(terminal_ ? columns : kDefaultColumns + kBarColumns), columns);
   drawn_ = true;
   if (file_of_caller()) return write_to_caller(line);
   std::fprintf(stderr, terminal_ ? "\r%s\033[K" : "%s\n", line.c_str());

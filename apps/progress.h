@@ -67,7 +67,7 @@ class ProgressLine {
   mutable std::mutex mutex_;  // of all below
   std::string phase_, reached_;
   std::function<std::string()> shown_;
-  uint64_t done_ = 0, total_ = 0, least_total_ = 0;
+  uint64_t done_ = 0, total_ = 0, min_total_ = 0;
   uint64_t first_ = 0;  // done_ when the phase began
   bool drawn_ = false, finished_ = false;
   Stopwatch of_line_, of_phase_, of_limit_;

@@ -164,7 +164,7 @@ namespace {
 
 /// The scene files of a folder and of those in it.
 std::string scenes_in(const std::string& folder) {
-  constexpr size_t kMost = 5;
+  constexpr size_t kMax = 5;
   std::vector<std::string> files;
   std::error_code ignored;
   for (fs::recursive_directory_iterator it(folder, ignored), end; it != end; it.increment(ignored)) {
@@ -176,7 +176,7 @@ std::string scenes_in(const std::string& folder) {
     return std::pair(depth(a), a) < std::pair(depth(b), b);
   });
   if (files.empty()) return fmt::format("which holds no scene ({})", scene_file_endings());
-  const size_t more = files.size() - std::min(files.size(), kMost);
+  const size_t more = files.size() - std::min(files.size(), kMax);
   files.resize(files.size() - more);
   return fmt::format("not a scene; give one that it holds: {}{}", shell_text(files),
                      more > 0 ? fmt::format(" and {} more", more) : "");

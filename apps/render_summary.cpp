@@ -29,7 +29,7 @@ constexpr double kFallOfMeans = 1, kFallOfPairs = 0.75, kFallOfDenoised = 0.5;
 /// The predicted error is mostly that of few pixels if it is more than so many times that of nearly all blocks.
 constexpr double kManyTimes = 4;
 /// Most of the time, and a render for which it matters.
-constexpr double kMostTime = 0.5, kLongSeconds = 5;
+constexpr double kMaxTime = 0.5, kLongSeconds = 5;
 
 double fall_of(const RenderOptions& options) {
   if (options.settings.denoising.denoises()) return kFallOfDenoised;
@@ -42,7 +42,7 @@ std::string percent_text(double relmse) { return fmt::format("{:.2g} %", 100 * s
 /// ": `--spp 64` halves it", ": about 2.8 % with `--spp 64`"; empty if so many samples are too many.
 std::string more_samples(const RenderReport& report, double relmse) {
   const double samples = std::round(report.result.samples_per_pixel());
-  if (samples < 1 || 4 * samples > kMostSamples || report.options.request().until > 0) return "";
+  if (samples < 1 || 4 * samples > kMaxSamples || report.options.request().until > 0) return "";
   const double factor = std::pow(4, -fall_of(report.options) / 2);
   if (factor <= 0.5) return fmt::format("; `--spp {:g}` halves it", 4 * samples);
   return fmt::format("; `--spp {:g}` leaves about {}", 4 * samples, percent_text(relmse * factor * factor));
@@ -81,7 +81,7 @@ std::string next_text(const RenderReport& report, const PhaseTimes& times) {
   const RenderResult& result = report.result;
   if (!missing_network(o.settings.denoising).empty() || o.sequence.is_sequence()) return "";  // it is said
   if (result.of_time) return fmt::format("`{}` instead of --time makes the same image", result.of_time->text());
-  const bool is_fixed = times.auxiliary + times.estimate > kMostTime * times.total() && times.total() > kLongSeconds;
+  const bool is_fixed = times.auxiliary + times.estimate > kMaxTime * times.total() && times.total() > kLongSeconds;
   if (is_fixed && result.predicted && o.request().until <= 0)
     return fmt::format("`--spp {:g}` takes much less than four times as long: most of this time was not for samples",
                        4 * std::round(result.samples_per_pixel()));

@@ -40,7 +40,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMostLayers = 100;  // of a file
+constexpr size_t kMaxLayers = 100;  // of a file
 
 struct ViewOptions {
   std::vector<std::string> images, insets;
@@ -186,11 +186,11 @@ void Page::add_errors(const Shown& image, const Image& pixels, nlohmann::ordered
 void Page::add_layers(const Shown& image, const std::string& shown, nlohmann::ordered_json& entry) {
   const ImageInfo info = inspect_image(image.path);
   std::vector<std::string> layers = offered_layers(info.channels, shown);
-  if (layers.size() > kMostLayers) {
+  if (layers.size() > kMaxLayers) {
     fmt::print(stderr,
                "covary: {}: {} layers beside the image; the page has the first {} (--layer shows another one)\n",
-               image.path, layers.size(), kMostLayers);
-    layers.resize(kMostLayers);
+               image.path, layers.size(), kMaxLayers);
+    layers.resize(kMaxLayers);
   }
   if (layers.empty()) return;
   std::vector<Image> read = read_layers(image.path, layers);

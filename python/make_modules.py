@@ -94,7 +94,7 @@ def estimator_function(estimator):
         passed.append("std_error=std_error")
     passed += [f"{identifier(o['name'])}={identifier(o['name'])}" for o in options]
     name = identifier(estimator["name"])
-    summary = f"{name}: {estimator['summary']}; at least {estimator['fewest_groups']} groups."
+    summary = f"{name}: {estimator['summary']}; at least {estimator['min_groups']} groups."
     call = listed("    return combine(", ["crn", "independent", repr(estimator["name"]), *passed], ")")
     return "\n".join([
         signature(name, fixed, options),

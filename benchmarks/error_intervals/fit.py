@@ -161,7 +161,7 @@ namespace covary {{
 
 struct FittedErrors {{
   ErrorFeatures middle, log_spread;          ///< a, b
-  double least_log_spread, most_log_spread;  ///< of the renders that were fitted
+  double min_log_spread, max_log_spread;  ///< of the renders that were fitted
   double low, high;                          ///< quantiles of r
 }};
 
@@ -169,7 +169,7 @@ struct FittedErrors {{
 inline constexpr FittedErrors kFittedErrors[] = {{
 {rows}
 }};
-/// For denoised means of fewer than kFewestGroups groups: by filters, by a network.
+/// For denoised means of fewer than kMinGroups groups: by filters, by a network.
 inline constexpr FittedErrors kFittedToFew[] = {{
 {few}
 }};
@@ -178,8 +178,8 @@ inline constexpr FittedErrors kFittedToFew[] = {{
 /// There is no interval if the largest group of each pixel has a larger fraction of the light that is not common to all
 /// groups, if the bounds are wider than this factor, if a larger fraction of the noise is in mirrors or behind glass,
 /// if fewer pixels hold the noise, or if there are fewer groups and the kind has no separate fit for few groups.
-inline constexpr double kMostOfLargest = {share}, kMostFactor = {factor}, kMostSpecular = {specular};
-inline constexpr int kFewestPixels = {fewest}, kFewestGroups = {groups};
+inline constexpr double kMaxOfLargest = {share}, kMaxFactor = {factor}, kMaxSpecular = {specular};
+inline constexpr int kMinPixels = {fewest}, kMinGroups = {groups};
 
 }}  // namespace covary
 """

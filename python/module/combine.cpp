@@ -155,7 +155,7 @@ struct CombineArguments {
 };
 
 /// Optional inputs besides the two images; None if not given.
-struct Beside {
+struct ExtraInputs {
   nb::object counts, light, albedo, normal, denoising_albedo, denoising_normal, position;
   nb::dict layers;
 };
@@ -168,7 +168,7 @@ std::vector<std::string> texts_of(const std::vector<Finding>& findings) {
 
 /// `mode`: "": the usual one of the estimator.
 DenoisingChoice denoising_of(const std::string& estimator, const std::string& mode, const std::string& oidn) {
-  OptionValues values{{"denoise", mode.empty() ? usual_denoising(estimator) : mode}};
+  OptionValues values{{"denoise", mode.empty() ? default_denoising(estimator) : mode}};
   if (!oidn.empty()) values["oidn"] = oidn;
   return settings_from<DenoisingChoice>(values);
 }
@@ -176,7 +176,7 @@ DenoisingChoice denoising_of(const std::string& estimator, const std::string& mo
 /// The features of --denoise.
 struct FeatureImages {
   Image albedo, normal, denoising_albedo, denoising_normal, position;
-  FeatureImages(const Beside& beside, const Method& estimator, const Input& image) {
+  FeatureImages(const ExtraInputs& beside, const Method& estimator, const Input& image) {
     const std::string shape = fmt::format("{}, {}, 3", image.height(), image.width());
     const auto take = [&](nb::handle array, const char* name, Image& to) {
       if (array.is_none()) return;
@@ -230,7 +230,7 @@ Method estimator_of(bool is_pair, const std::string& name, const OptionValues& o
   return with_denoising(make_estimator(kNoEstimator, options), denoising);
 }
 
-nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, const CombineArguments& arguments,
+nb::dict combine(nb::object crn, nb::object independent, const ExtraInputs& beside, const CombineArguments& arguments,
                  nb::object progress) {
   const Film* light = film_of(beside.light);
   Pair pair(crn, independent, light);

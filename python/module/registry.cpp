@@ -65,7 +65,7 @@ nb::list estimators() {
     d["is_default_of_pairs"] = name == kDefaultOfPairs;
     d["adaptive"] = estimator.adaptive.has_value();
     d["denoises"] = can_be_denoised(estimator);
-    d["fewest_groups"] = estimator.fewest_groups;
+    d["min_groups"] = estimator.min_groups;
     d["options"] = list_of(options_of_estimator(name));
     list.append(d);
   }

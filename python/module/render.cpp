@@ -212,7 +212,7 @@ nb::dict image_of_films(const Options& values, const Options& of_estimator, nb::
   run_work(
       [&](WorkState& state) {
         const Stopwatch watch;
-        Beside beside;
+        ExtraInputs beside;
         if (plan.method->reads_features) beside.features = features_among(result.aovs);
         const int height = result.passes[0].film.height();
         const auto estimate = [&] { result.image = finish(image_of(plan, result.passes, 0, height, beside)); };

@@ -11,7 +11,7 @@
 namespace covary {
 namespace {
 
-constexpr float kLeastRoughness = 0.07f;
+constexpr float kMinRoughness = 0.07f;
 constexpr int kSheenMus = 64, kSheenRoughnesses = 32, kSheenSide = 32;
 
 float sheen_node(int i, int n) { return static_cast<float>(i) / static_cast<float>(n - 1); }
@@ -41,7 +41,7 @@ struct Table {
 }  // namespace
 
 CharlieSheen::CharlieSheen(float roughness) {
-  const float alpha = sqr(std::max(roughness, kLeastRoughness)), t = sqr(1 - alpha);
+  const float alpha = sqr(std::max(roughness, kMinRoughness)), t = sqr(1 - alpha);
   inverse_alpha_ = 1 / alpha;
   // [EstevezKulla2017] Table 1.
   a_ = lerp(t, 21.5473f, 25.3245f), b_ = lerp(t, 3.82987f, 3.32435f), c_ = lerp(t, 0.19823f, 0.16801f);

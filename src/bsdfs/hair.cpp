@@ -46,8 +46,8 @@ float logistic_distribution(float x, float s) { return 1 / (1 + std::exp(-x / s)
 FibreShape make_fibre(float eta, float beta_m, float beta_n, float alpha_degrees) {
   FibreShape f{};
   f.eta = eta;
-  constexpr float kLeast = 0.02f;
-  const double m = std::max(beta_m, kLeast), n = std::max(beta_n, kLeast);
+  constexpr float kMin = 0.02f;
+  const double m = std::max(beta_m, kMin), n = std::max(beta_n, kMin);
   // [Chiang2016]: variance and scale as functions of perceptually uniform roughness.
   f.v[0] = static_cast<float>(sqr(0.726 * m + 0.812 * m * m + 3.7 * std::pow(m, 20)));
   f.v[1] = 0.25f * f.v[0];

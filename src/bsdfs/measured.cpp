@@ -207,7 +207,7 @@ class MaterialFile {
     const std::vector<uint64_t>& found = file_.shape(field);
     bool right = found.size() == shape.size();
     for (size_t i = 0; right && i < shape.size(); ++i)
-      right = shape[i] == 0 ? found[i] >= 2 && found[i] <= kMostCells : found[i] == shape[i];
+      right = shape[i] == 0 ? found[i] >= 2 && found[i] <= kMaxCells : found[i] == shape[i];
     std::vector<std::string> wanted;
     for (const uint64_t length : shape) wanted.push_back(length == 0 ? "2 or more" : std::to_string(length));
     if (!right)
@@ -236,9 +236,9 @@ class MaterialFile {
   static std::vector<Spectrum> rgb_colours() { return {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}; }
   /// What one unit at each wavelength adds to the colour of a reflectance.
   std::vector<Spectrum> wavelength_colours() const {
-    constexpr uint64_t kMost = 1024;
+    constexpr uint64_t kMax = 1024;
     const std::vector<float> nm = file_.floats("wavelengths");
-    bool right = nm.size() >= 2 && nm.size() <= kMost;
+    bool right = nm.size() >= 2 && nm.size() <= kMax;
     for (size_t i = 1; right && i < nm.size(); ++i) right = nm[i - 1] < nm[i];
     if (!right) throw refusal("has a field 'wavelengths' that is not a list of increasing wavelengths");
     std::vector<Spectrum> result;
@@ -265,7 +265,7 @@ class MaterialFile {
     return result;
   }
 
-  static constexpr uint64_t kMostCells = 1 << 16;  // along one side of a grid
+  static constexpr uint64_t kMaxCells = 1 << 16;  // along one side of a grid
   std::string path_;
   TensorFile file_;
 };

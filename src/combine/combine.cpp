@@ -28,7 +28,7 @@ namespace covary {
 namespace {
 
 constexpr int kLightRows = 64;  // rows of the light film in memory at a time
-constexpr int kFewestRows = 16;
+constexpr int kMinRows = 16;
 /// Bands that share more than pixels have at least so many times the rows around them, if memory allows: those are
 /// computed twice.
 constexpr int kUsefulRows = 6;
@@ -56,14 +56,14 @@ std::string inputs_text(const CombineRequest& request) {
 }
 
 void check_memory(const CombineRequest& request, double planned) {
-  if (planned <= std::max(kLeastMemoryLimit, request.most_memory.value_or(memory_limit()))) return;
+  if (planned <= std::max(kMinMemoryLimit, request.max_memory.value_or(memory_limit()))) return;
   throw Error(
       ErrorCode::kUsage,
       fmt::format(
           "{} x {} pixels of {} need {}{} of memory for {}{}; {}", request.independent.width,
           request.independent.height, inputs_text(request), needs_whole(request) ? "" : "at least ",
           bytes_text(planned), request.estimator.text, needs_whole(request) ? ", which works on whole images" : "",
-          request.most_memory ? bytes_text(*request.most_memory) + " are allowed (`memory`)" : memory_limit_text()));
+          request.max_memory ? bytes_text(*request.max_memory) + " are allowed (`memory`)" : memory_limit_text()));
 }
 
 /// The light film's error is its variance alone and is added to every image. `before`: the error predicted without it.
@@ -103,7 +103,7 @@ MethodImage estimate(const CombineRequest& request) {
     };
     return estimator.image_in_rows({request.independent.width, height, in_memory, rows}, request.settings);
   }
-  const int step = std::max(kFewestRows, in_memory - 2 * estimator.reach) / kResidualCell * kResidualCell;
+  const int step = std::max(kMinRows, in_memory - 2 * estimator.reach) / kResidualCell * kResidualCell;
   MethodImage whole;
   for (int y = 0; y < height; y += step) {
     const int n = std::min(step, height - y);
@@ -152,7 +152,7 @@ int rows_within(const CombineRequest& request, double memory) {
   return static_cast<int>(std::clamp((memory - results) / row, 0.0, height - 1.0));
 }
 
-double most_memory_of(const CombineRequest& request) { return request.most_memory.value_or(memory_limit()); }
+double max_memory_of(const CombineRequest& request) { return request.max_memory.value_or(memory_limit()); }
 
 }  // namespace
 
@@ -161,13 +161,13 @@ int rows_in_memory(const CombineRequest& request) {
   if (!request.estimator.image_in_rows || needs_whole(request)) return rows;
   const int useful = kUsefulRows * request.estimator.reach;
   if (rows >= useful) return rows;
-  return std::max(rows, std::min(useful, rows_within(request, most_memory_of(request))));
+  return std::max(rows, std::min(useful, rows_within(request, max_memory_of(request))));
 }
 
 double planned_memory(const CombineRequest& request) {
   const int height = request.independent.height, reach = request.estimator.reach;
   const int cells = kRegressionCell + (request.estimator.image_in_rows ? kBandCell : 0);
-  const int fewest = needs_whole(request) ? height : std::min(height, kFewestRows + cells + 2 * reach);
+  const int fewest = needs_whole(request) ? height : std::min(height, kMinRows + cells + 2 * reach);
   const int rows = std::max(fewest, rows_in_memory(request));
   const double of_rows = memory_of_rows(request, rows);
   if (request.estimator.network.empty() || rows >= height) return of_rows;
@@ -178,8 +178,8 @@ double planned_memory(const CombineRequest& request) {
 
 void limit_memory(CombineRequest& request, std::optional<double> mebibytes) {
   constexpr double kMebibyte = 1 << 20, kUsual = 6144 * kMebibyte;
-  if (mebibytes) request.most_memory = *mebibytes * kMebibyte;
-  request.memory = request.most_memory.value_or(std::min(kUsual, memory_limit()));
+  if (mebibytes) request.max_memory = *mebibytes * kMebibyte;
+  request.memory = request.max_memory.value_or(std::min(kUsual, memory_limit()));
 }
 
 Band band_around(const CombineRequest& request, int first, int last) {
@@ -220,7 +220,7 @@ void report(const std::vector<StrayValue>& strays, const ImageNames& names, std:
                       fmt::format("{}: {} value{} that outshine{} the whole picture {:.0f} times {} left out, "
                                   "the largest of {:.3g} at ({}, {}) in {}; find the cause in the renderer",
                                   names.image, strays.size(), strays.size() == 1 ? "" : "s",
-                                  strays.size() == 1 ? "s" : "", kMostOfPicture, strays.size() == 1 ? "is" : "are",
+                                  strays.size() == 1 ? "s" : "", kMaxOfPicture, strays.size() == 1 ? "is" : "are",
                                   s.brightness, s.x, s.y, names.render(static_cast<size_t>(s.group)))});
 }
 
@@ -255,7 +255,7 @@ InputFindings examine(const CombineRequest& request) {
   SameSeedChecks crn_seeds(independent.width, independent.height, groups_with_seeds(request.crn));
   SameSeedChecks seeds(independent.width, independent.height, groups_with_seeds(independent));
   StrayValues of_crn, of_independent;
-  const int step = std::max(kFewestRows, rows_in_memory(request));
+  const int step = std::max(kMinRows, rows_in_memory(request));
   bool checkable = true;
   for (int y = 0; y < independent.height && checkable; y += step) {
     const int n = std::min(step, independent.height - y);

@@ -38,7 +38,7 @@ struct CombineRequest {
   /// is limited.
   double memory = std::numeric_limits<double>::infinity();
   /// Memory limit in bytes where bands do not help; default: memory_limit() (core/memory_limit.h).
-  std::optional<double> most_memory;
+  std::optional<double> max_memory;
   /// Called after the inputs are checked, before errors among the findings are thrown.
   std::function<void(const InputFindings&)> checked;
 };

@@ -17,8 +17,8 @@ constexpr OptionTraits kFile{.names = OptionNames::kFile};
 
 std::string read_pixel(const std::string& text, std::optional<PixelPosition>& pixel) {
   const auto at = parse_whole_numbers(text, ',', 2);
-  constexpr int kMost = std::numeric_limits<int>::max();
-  if (!at || (*at)[0] > kMost || (*at)[1] > kMost) return "X,Y, e.g. 240,560";
+  constexpr int kMax = std::numeric_limits<int>::max();
+  if (!at || (*at)[0] > kMax || (*at)[1] > kMax) return "X,Y, e.g. 240,560";
   pixel = {static_cast<int>((*at)[0]), static_cast<int>((*at)[1])};
   return "";
 }
@@ -55,7 +55,7 @@ void declare(Settings& s, CombineSettings& v) {
   names.insert(names.begin(), kDefaultEstimator);
   s.one_of("estimator", v.estimator, names,
            "How the images are combined. The default denoises, by mixing; others are denoised only by `denoise`");
-  v.denoising.mode = usual_denoising(v.estimator);
+  v.denoising.mode = default_denoising(v.estimator);
   declare(s, v.denoising);
   s.group("");
   s.text("features", v.features, "FILE",

@@ -95,7 +95,7 @@ TEST(Combine, PlansWhatTheNetworkTakesBeforeThereAreBands) {
   EXPECT_GT(planned_memory(request), network_library_memory() + network_tile_memory(400.0 * 1000));
   EXPECT_TRUE(contains(message_of([&] { combine(request); }, ErrorCode::kUsage), "need at least 297.6 MB"));
   EXPECT_TRUE(contains(message_of([&] { combine(request); }, ErrorCode::kUsage), "157.3 MB are allowed"));
-  request.most_memory = request.memory = 320e6;  // with room for the library
+  request.max_memory = request.memory = 320e6;  // with room for the library
   EXPECT_LE(planned_memory(request), 320e6);
 }
 

@@ -24,7 +24,7 @@ constexpr double kMinCrnCorrelation = 0.02;
 constexpr double kMaxSigmas = 8;  // for t with about 11 degrees of freedom: false-alarm rate below 1e-5
 constexpr long kMaxPixelPairs = 250000;
 constexpr long kFewPairs = 200;
-constexpr double kMostLeftOut = 0.01;  // of the pixels
+constexpr double kMaxLeftOut = 0.01;  // of the pixels
 
 /// Ranks 0 … T-1 of the grey group values of a pixel, ties averaged, minus their mean; false if all values are equal.
 bool centred_ranks(const GroupedImage& image, int x, int y, std::vector<float>& values, std::vector<float>& ranks) {
@@ -142,15 +142,15 @@ void finish(Values& v, long pixels) {
 
 /// Noisy values that are limited to 1 leave pixels in which some are 1; a white background does not.
 bool is_clipped(const Values& v, long pixels) {
-  constexpr long kFewest = 500, kFewestPartly = 20;  // one in so many, of the pixels and of those that are 1
-  return v.brightest <= 1 && v.clipped * kFewest > pixels &&
-         (v.partly_clipped * kFewestPartly > v.clipped || v.clipped == pixels);
+  constexpr long kMin = 500, kMinPartly = 20;  // one in so many, of the pixels and of those that are 1
+  return v.brightest <= 1 && v.clipped * kMin > pixels &&
+         (v.partly_clipped * kMinPartly > v.clipped || v.clipped == pixels);
 }
 
 void check_values(const ImageNames& names, long pixels, const Values& v, std::vector<Finding>& findings) {
   const std::string& name = names.image;
   if (v.nonfinite) {
-    const bool too_many = v.nonfinite > kMostLeftOut * static_cast<double>(pixels);
+    const bool too_many = v.nonfinite > kMaxLeftOut * static_cast<double>(pixels);
     findings.push_back(
         {too_many ? Severity::kError : Severity::kWarning,
          fmt::format("{}: {} of {} pixels hold NaN, infinite or overflowing values, the first at ({}, {}) in {}; "

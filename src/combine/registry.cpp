@@ -101,7 +101,7 @@ Method with_denoising(const Method& base, const DenoisingChoice& choice, const M
   return with_denoising(base, options);
 }
 
-std::string usual_denoising(const std::string& estimator) {
+std::string default_denoising(const std::string& estimator) {
   return estimator == kDefaultEstimator ? DenoisingChoice::kAuto : DenoisingChoice::kNone;
 }
 
@@ -111,7 +111,7 @@ Method make_default_estimator(bool is_pair, const OptionValues& values, const De
 }
 
 Method make_default_estimator() {
-  return make_default_estimator(false, {}, {usual_denoising(kDefaultEstimator), "", {}});
+  return make_default_estimator(false, {}, {default_denoising(kDefaultEstimator), "", {}});
 }
 
 std::vector<std::string> estimators_with_option(const std::string& option) {

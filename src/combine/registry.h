@@ -66,7 +66,7 @@ std::vector<std::string> estimators_with_option(const std::string& option);
 Method with_denoising(const Method& base, const DenoisingChoice& choice, const MethodTarget& target = {});
 
 /// The value of `denoise` for an estimator if it was not given: auto for the default, none for those that are named.
-std::string usual_denoising(const std::string& estimator);
+std::string default_denoising(const std::string& estimator);
 /// What the default means for a pair of images (`is_pair`) or for independent samples alone, with its options and
 /// denoising. Throws Error(kUsage) like make_estimator() and with_denoising().
 Method make_default_estimator(bool is_pair, const OptionValues& values, const DenoisingChoice& choice,

@@ -143,10 +143,10 @@ TEST(EstimatorRegistry, EachEstimatorDoesWhatItSays) {
       const test::Grouped g = groups(n, 1, true), h = groups(n, 1, false);
       return estimator.image({g.view(), h.view()}, {4 * n, estimator.predicts_error});
     };
-    const EstimatorResult result = run(estimator.fewest_groups);
+    const EstimatorResult result = run(estimator.min_groups);
     EXPECT_EQ(result.estimate.data.size(), size_t{kWidth} * kHeight * 3);
     EXPECT_EQ(!result.std_error.data.empty(), estimator.predicts_error);
-    EXPECT_THROW(run(estimator.fewest_groups - 1), Error);
+    EXPECT_THROW(run(estimator.min_groups - 1), Error);
     if (!estimator.pair()->explain) continue;
     EXPECT_FALSE(estimator.pair()->explain(crn().view(), independent().view(), 5, 5).empty());
   }
@@ -155,7 +155,7 @@ TEST(EstimatorRegistry, EachEstimatorDoesWhatItSays) {
 TEST(EstimatorRegistry, AdaptiveEstimatorsHaveTheirNumbers) {
   const Method usual = make_estimator("dependent-tests");
   ASSERT_TRUE(usual.adaptive);
-  EXPECT_EQ(usual.adaptive->counts.allocation, Allocation::kLeastError);
+  EXPECT_EQ(usual.adaptive->counts.allocation, Allocation::kMinError);
   EXPECT_FALSE(usual.adaptive->counts.classes);
   const Method paper = make_estimator("dependent-tests", {{"paper", ""}});
   EXPECT_EQ(paper.adaptive->counts.allocation, Allocation::kEqualError);
@@ -272,7 +272,7 @@ std::string row_of(const Method& e) {
                        : e.pixel_pass() ? "independent, all samples of a pixel"
                                         : "one of either kind";
   const std::string combine = pair && e.reach < 0 ? "whole images" : pair || is_default ? "in bands" : "no";
-  return fmt::format("| `{}` | {} | {} | {} | {} | {} |", e.name, passes, e.fewest_groups, yes_or_no(e.predicts_error),
+  return fmt::format("| `{}` | {} | {} | {} | {} | {} |", e.name, passes, e.min_groups, yes_or_no(e.predicts_error),
                      yes_or_no(pair && e.pair()->explain), combine);
 }
 

@@ -14,19 +14,19 @@ namespace covary {
 namespace {
 
 /// Squares of pixels in all groups together.
-constexpr long kMostSquares = 4000000;
+constexpr long kMaxSquares = 4000000;
 /// Smallest D, over the square's brightness, that counts as a difference between neighbours: smooth parts and rounding
 /// to 16 bits are below it.
-constexpr float kLeastDetail = 0.01f;
+constexpr float kMinDetail = 0.01f;
 /// D of two groups is the same if it differs by no more than this. Different seeds would need a million samples per
 /// pixel for that; sums in another order differ by 1e-5.
 constexpr float kSame = 1e-3f;
 /// Squares with a difference between neighbours that are needed as evidence, and their part of those that are not flat:
 /// noise is everywhere, edges are not.
-constexpr long kFewestSquares = 100;
-constexpr double kLeastPart = 0.25;
+constexpr long kMinSquares = 100;
+constexpr double kMinPart = 0.25;
 /// The fraction of them that may differ between groups of one seed: rounding sends a few paths elsewhere.
-constexpr double kMostDiffer = 0.05;
+constexpr double kMaxDiffer = 0.05;
 
 /// D of the square whose corner is (x, y), in group t. Sets `varied` if it is not exactly 0.
 float detail(const GroupedImage& image, int x, int y, int t, bool& varied) {
@@ -35,7 +35,7 @@ float detail(const GroupedImage& image, int x, int y, int t, bool& varied) {
   const float d = g[0] - g[1] - g[2] + g[3];
   varied = std::isfinite(d) && d != 0;
   const float brightest = std::max({std::abs(g[0]), std::abs(g[1]), std::abs(g[2]), std::abs(g[3])});
-  return varied && std::abs(d) > kLeastDetail * brightest ? d : 0;
+  return varied && std::abs(d) > kMinDetail * brightest ? d : 0;
 }
 
 /// How the details of two groups compare.
@@ -43,8 +43,8 @@ struct Likeness {
   long squares = 0, differ = 0;
   bool identical = true;
   bool is_same(long varied) const {
-    return squares >= kFewestSquares && static_cast<double>(squares) >= kLeastPart * static_cast<double>(varied) &&
-           static_cast<double>(differ) <= kMostDiffer * static_cast<double>(squares);
+    return squares >= kMinSquares && static_cast<double>(squares) >= kMinPart * static_cast<double>(varied) &&
+           static_cast<double>(differ) <= kMaxDiffer * static_cast<double>(squares);
   }
 };
 
@@ -62,7 +62,7 @@ Likeness compare(const std::vector<float>& a, const std::vector<float>& b) {
 }  // namespace
 
 SameSeedChecks::SameSeedChecks(int width, int height, int groups)
-    : step_(static_cast<int>(std::max(1L, long{width} * height * groups / kMostSquares))), groups_(groups) {}
+    : step_(static_cast<int>(std::max(1L, long{width} * height * groups / kMaxSquares))), groups_(groups) {}
 
 void SameSeedChecks::add_rows(const GroupedImage& image) {
   for (int y = 0; y < image.height; ++y, ++next_row_) {

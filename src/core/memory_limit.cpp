@@ -49,10 +49,10 @@ double memory_limit() {
   if (!given || !*given) return kShare * machine_memory();
   const std::string_view text = given;
   const double gigabytes = parse_real(text).value_or(0);
-  if (!(gigabytes * 1e9 >= kLeastMemoryLimit && gigabytes < 1e9))
+  if (!(gigabytes * 1e9 >= kMinMemoryLimit && gigabytes < 1e9))
     throw Error(ErrorCode::kUsage, fmt::format("the environment variable {} is '{}'; expected a number of GB, at "
                                                "least {:g}",
-                                               kVariable, text, kLeastMemoryLimit / 1e9));
+                                               kVariable, text, kMinMemoryLimit / 1e9));
   return gigabytes * 1e9;
 }
 

@@ -8,13 +8,13 @@
 namespace covary {
 
 /// Smallest accepted limit, in bytes.
-inline constexpr double kLeastMemoryLimit = 200e6;
+inline constexpr double kMinMemoryLimit = 200e6;
 
 /// Memory of the machine in bytes, or of the program's control group (container) if that is less.
 double machine_memory();
 
 /// Bytes that input files may make the program use: three quarters of machine_memory(), or the environment variable
-/// COVARY_MEMORY, in GB. Throws Error(kUsage) if that is not a number or below kLeastMemoryLimit.
+/// COVARY_MEMORY, in GB. Throws Error(kUsage) if that is not a number or below kMinMemoryLimit.
 double memory_limit();
 
 /// Throws Error(kInput) if `bytes` plus what the program already uses exceeds memory_limit(): "FILE: WHAT needs 12 GB

@@ -26,8 +26,8 @@ inline double processor_seconds() {
 /// times how much longer such work took before, which got `processor` seconds within `clock` seconds, because other
 /// programs have the processors, too. A tenth of a second of the clock or less tells nothing.
 inline double clock_seconds(double needed, double threads, double processor, double clock) {
-  constexpr double kTells = 0.1, kLeastShare = 0.01;
-  const double share = clock > kTells ? std::clamp(processor / (clock * threads), kLeastShare, 1.0) : 1;
+  constexpr double kTells = 0.1, kMinShare = 0.01;
+  const double share = clock > kTells ? std::clamp(processor / (clock * threads), kMinShare, 1.0) : 1;
   return needed / (threads * share);
 }
 

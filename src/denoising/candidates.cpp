@@ -16,7 +16,7 @@ namespace covary {
 namespace {
 
 /// The smallest albedo to divide by.
-constexpr float kLeastAlbedo = 0.02f;
+constexpr float kMinAlbedo = 0.02f;
 
 /// Copies an image's channels, divided by `unit`, to the planes from index `first` on.
 void copy_feature(const Image& image, float unit, int first, Planes& planes) {
@@ -35,7 +35,7 @@ Image combined(const Image& a, const Image& b, const Operation& operation) {
 
 struct FilterFeatures : RegressionFeatures {
   Planes all, normal;
-  Image albedo;       // at least kLeastAlbedo; empty where there is none
+  Image albedo;       // at least kMinAlbedo; empty where there is none
   int first_row = 0;  // of a larger image
 };
 
@@ -48,7 +48,7 @@ FilterFeatures filter_features(const Features& features, FilterKinds kinds) {
   result.all = planes(*features.albedo, features.normal ? 6 : 3);
   copy_feature(*features.albedo, kAlbedoUnit, 0, result.all);
   result.albedo = *features.albedo;
-  for (float& value : result.albedo.data) value = std::max(value, kLeastAlbedo);
+  for (float& value : result.albedo.data) value = std::max(value, kMinAlbedo);
   if (!features.normal) return result;
   result.normal = planes(*features.normal, 3);
   copy_feature(*features.normal, kNormalUnit, 3, result.all);

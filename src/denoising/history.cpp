@@ -13,11 +13,11 @@
 namespace covary {
 namespace {
 
-constexpr float kInterval = 3;        // k, in standard errors
-constexpr int kErrorWindow = 5;       // side, pixels
-constexpr float kLeastScale = 0.02f;  // added to colours that divide standard errors
+constexpr float kInterval = 3;      // k, in standard errors
+constexpr int kErrorWindow = 5;     // side, pixels
+constexpr float kMinScale = 0.02f;  // added to colours that divide standard errors
 /// The most by which features may change a history, relative to its colour.
-constexpr float kMostOfColour = 0.2f;
+constexpr float kMaxOfColour = 0.2f;
 /// MixtureInput::prior
 constexpr float kPrior = 2;
 /// MixtureInput::bias_share. Halves have twice the variance of the frame but the same history, whose error is all bias
@@ -39,7 +39,7 @@ float trust_at(const History& history, const Image& std_error, float scale, int 
 /// in a still room with 8 samples. Means would let a glint widen the intervals of all pixels around it, and absolute
 /// errors those of dark pixels among bright ones, where a reflection has moved on.
 Image steady(const Image& std_error, const Image& picture) {
-  const auto scale = [&](int x, int y, int c) { return std::abs(picture.pixel(x, y)[c]) + kLeastScale; };
+  const auto scale = [&](int x, int y, int c) { return std::abs(picture.pixel(x, y)[c]) + kMinScale; };
   Image result = std_error;
   const int radius = kErrorWindow / 2;
   parallel_for(result.height, 8, [&](int y) {
@@ -86,10 +86,10 @@ Image limited(const Image& frame, const Image& accumulated, const Image& std_err
 }
 
 /// The largest weight of R in R', so that new samples always count.
-constexpr float kMostOfSamples = 0.9f;
+constexpr float kMaxOfSamples = 0.9f;
 
 /// Range of the factors that scale history.
-constexpr float kLeastFactor = 0.1f, kMostFactor = 10;
+constexpr float kMinFactor = 0.1f, kMaxFactor = 10;
 
 /// Factors per channel that make two images of the history follow the frame's light:
 ///
@@ -122,7 +122,7 @@ Image light_factors(const History& history, const HistoryInput& input, const std
       for (int c = 0; c < 3; ++c) {
         const float d = sums[c][l], r = sums[3 + c][l], v = sums[6 + c][l];
         if (!valid[static_cast<size_t>(y) * counts.width + x + l] || !(r > 0) || !(sqr(d) > v)) continue;
-        factors.pixel(x + l, y)[c] = std::clamp(1 + (1 - v / sqr(d)) * d / r, kLeastFactor, kMostFactor);
+        factors.pixel(x + l, y)[c] = std::clamp(1 + (1 - v / sqr(d)) * d / r, kMinFactor, kMaxFactor);
       }
   });
   return factors;
@@ -135,9 +135,8 @@ void multiply(const Image& factors, Image& image) {
 /// R' with b = 1. `trust`: trust_at() of each pixel.
 Image with_samples(const Image& own, const Image& before, const Image& trust) {
   Image result = own;
-  parallel_for(result.data.size(), 4096, [&](size_t i) {
-    result.data[i] += kMostOfSamples * trust.data[i / 3] * (before.data[i] - own.data[i]);
-  });
+  parallel_for(result.data.size(), 4096,
+               [&](size_t i) { result.data[i] += kMaxOfSamples * trust.data[i / 3] * (before.data[i] - own.data[i]); });
   return result;
 }
 
@@ -172,7 +171,7 @@ void follow_features(History& history, const Image& albedo, const Image& normal)
       for (size_t f = 0; f < kHistoryFeatures; ++f)
         change += slopes[3 * f + c] * ((f < 3 ? albedo : normal).data[3 * i + f % 3] - before[f]);
       squares += sqr(change) / 3;
-      const float most = kMostOfColour * (std::abs(colour) + kLeastScale);
+      const float most = kMaxOfColour * (std::abs(colour) + kMinScale);
       change = std::isfinite(change) ? std::clamp(change, -most, most) : 0;
       colour += change;
       for (Image& half : history.samples)

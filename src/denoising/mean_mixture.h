@@ -13,7 +13,7 @@
 namespace covary {
 
 struct MeanMixture {
-  GroupedImage independent;  ///< of two groups or more, and kFewestMixedSamples samples or more in each pixel
+  GroupedImage independent;  ///< of two groups or more, and kMinMixedSamples samples or more in each pixel
   Features features;
   FilterKinds kinds = FilterKinds::kRegression;
   PartsWeighting weighting;

@@ -146,7 +146,7 @@ bool can_be_mixed(const GroupedImage& image) {
   if (image.groups < 2) return false;
   const size_t n_pixels = static_cast<size_t>(image.width) * image.height;
   return !image.counts ||
-         std::all_of(image.counts, image.counts + n_pixels, [](uint32_t n) { return n >= kFewestMixedSamples; });
+         std::all_of(image.counts, image.counts + n_pixels, [](uint32_t n) { return n >= kMinMixedSamples; });
 }
 
 /// The candidate that was best with few samples in measurements.
@@ -163,7 +163,7 @@ MixedDenoising single_candidate(const GroupedImage& independent, const std::vect
   out.result.note = fmt::format(
       "with fewer than {} samples per pixel denoised images cannot be judged: the picture is the candidate '{}', and "
       "its error is unknown",
-      kFewestMixedSamples, out.names[best]);
+      kMinMixedSamples, out.names[best]);
   out.weights.assign(set.candidates.size(), Image(independent.width, independent.height, 1));
   std::fill(out.weights[best].data.begin(), out.weights[best].data.end(), 1.0f);
   out.candidates = std::move(set.candidates);
@@ -197,12 +197,12 @@ Run run_of_pair(const Method& base, const MixedDenoisingOptions& options, bool w
   return [=](const Samples& samples, const MethodSettings& settings, bool /*stages*/) {
     check_features(settings.features);
     const auto& [crn, independent] = samples;
-    if (std::min(crn.groups, independent.groups) < 2 * base.fewest_groups) {
+    if (std::min(crn.groups, independent.groups) < 2 * base.min_groups) {
       MixedDenoising out;
       out.result = base.image(samples, settings);
       out.result.note =
           fmt::format("with fewer than {} groups denoised images cannot be judged: the picture is that of {} alone",
-                      2 * base.fewest_groups, base.text);
+                      2 * base.min_groups, base.text);
       return out;
     }
     std::vector<CandidateMaker> makers = {filtered_candidates(settings.features)};
@@ -274,7 +274,7 @@ RowsMethod rows_of_pair(const Method& base) {
   method.filters = [](const Features& features, int first_row) {
     return filtered_candidates(features, CandidateBase::kPair, FilterKinds::kNlMeans, first_row);
   };
-  method.are_enough = [n = 2 * base.fewest_groups](const Samples& rows) {
+  method.are_enough = [n = 2 * base.min_groups](const Samples& rows) {
     return std::min(rows.crn.groups, rows.independent.groups) >= n;
   };
   method.of_few = [run = run_of_pair(base, {}, false)](const Samples& rows, const MethodSettings& settings,
@@ -352,7 +352,7 @@ Method with_denoising(const Method& base, const MixedDenoisingOptions& options) 
   method.text = (base.is_mean() ? text_as(kMixture, base) : base.text) +
                 fmt::format(" --denoise {}{}", settings_of(options.mode).name, with_oidn ? "" : " --oidn off");
   if (with_oidn) method.network = "Open Image Denoise " + denoiser_info(options.oidn).version;  // or throws
-  method.fewest_groups = base.is_mean() ? 1 : 2 * base.fewest_groups;
+  method.min_groups = base.is_mean() ? 1 : 2 * base.min_groups;
   method.predicts_error = method.reads_features = true;
   method.reliable_samples = base.reliable_samples;
   method.memory = base.memory;

@@ -56,7 +56,7 @@ struct MixedDenoisingOptions {
 };
 
 /// A method that holds another, whose image it denoises: that of a pair that predicts its error, or the mean. For the
-/// former, it needs twice the groups. For the mean, it takes one independent pass: a mixture from kFewestMixedSamples
+/// former, it needs twice the groups. For the mean, it takes one independent pass: a mixture from kMinMixedSamples
 /// samples on, and the best single candidate with fewer. Throws Error(kUsage) for any other base.
 Method with_denoising(const Method& base, const MixedDenoisingOptions& options);
 
@@ -97,7 +97,7 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
                                   const MixingHistory& history = {});
 
 /// The smallest number of samples per pixel, in two groups or more, with which halves can compare candidates.
-inline constexpr int kFewestMixedSamples = 4;
+inline constexpr int kMinMixedSamples = 4;
 
 /// The modes by name, "none" first.
 const std::vector<std::string>& denoise_mode_names();

@@ -425,7 +425,7 @@ TEST(MixedDenoising, SaysWhatItCannotDo) {
               with_denoising(make_estimator("iicv"), elsewhere).image({in.crn.view(), in.independent.view()}, {});
             }).find("Open Image Denoise was not found (/nowhere/"),
             std::string::npos);
-  EXPECT_EQ(denoiser(DenoiseMode::kError).fewest_groups, 6);
+  EXPECT_EQ(denoiser(DenoiseMode::kError).min_groups, 6);
 }
 
 }  // namespace

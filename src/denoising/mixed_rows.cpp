@@ -16,7 +16,7 @@ namespace covary {
 namespace {
 
 /// HeldOutInput::error_over_variance
-double usual_error(const std::vector<CandidateMaker>& makers) {
+double typical_error(const std::vector<CandidateMaker>& makers) {
   double usual = 0.5;
   for (const CandidateMaker& maker : makers) usual = std::max(usual, maker.error_over_variance);
   return usual;
@@ -114,7 +114,7 @@ void append(const MixedRows& part, int skipped, int y, int n, int height, MixedR
 MethodImage finish(MixedRows whole, const std::vector<CandidateMaker>& makers, const std::string& base) {
   if (whole.of_base.empty()) return std::move(whole.result);
   const std::vector<HeldOutRow> rows = whole.error.rows;
-  whole.result.std_error = held_out_error(std::move(whole.error), whole.disagreement, usual_error(makers));
+  whole.result.std_error = held_out_error(std::move(whole.error), whole.disagreement, typical_error(makers));
   whole.error.rows = rows;
   whole.result.risks = risks_of(whole, names_of(makers), base, predicted_relmse(whole.result));
   return std::move(whole.result);

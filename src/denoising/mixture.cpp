@@ -17,11 +17,11 @@ namespace {
 using namespace lanes;
 
 /// Sums of normal equations, a pixel per lane; the last is v, the variance of the halves' U_p, summed over p.
-using Sums = std::array<vfloat, n_normal_sums(kMostCandidates)>;
+using Sums = std::array<vfloat, n_normal_sums(kMaxCandidates)>;
 
 /// Adds the normal equations of one pixel to `sums`, in 1 / (squared radiance).
 void add_pixel(const MixtureInput& in, int m, int x, int y, float* sums) {
-  std::array<std::array<float, 3>, kMostCandidates> u[2];
+  std::array<std::array<float, 3>, kMaxCandidates> u[2];
   std::array<float, 3> residual[2], base[2];
   float weight[2];
   for (int half : {0, 1}) {
@@ -79,8 +79,8 @@ int n_candidates(const MixtureInput& in) { return static_cast<int>(in.halves[0]-
 }  // namespace
 
 std::vector<SampledRows> sampled_rows(int width, int height) {
-  if (static_cast<double>(width) * height <= kMostSampledPixels) return {{0, height}};
-  const double rows = std::max(1.0, std::round(kMostSampledPixels / width / kSampledBlocks));
+  if (static_cast<double>(width) * height <= kMaxSampledPixels) return {{0, height}};
+  const double rows = std::max(1.0, std::round(kMaxSampledPixels / width / kSampledBlocks));
   std::vector<SampledRows> blocks;
   for (int i = 0; i < kSampledBlocks; ++i) {
     const int first = static_cast<int>((i + 0.5) * height / kSampledBlocks - rows / 2);
@@ -107,10 +107,10 @@ std::vector<float> weights_everywhere(const MixtureInput& in, int m, const std::
     for (const NormalRow& row : rows) sum += row[static_cast<size_t>(i)];
     sums[i] = splat(static_cast<float>(sum));
   }
-  std::array<vfloat, kMostCandidates + 1> x;
-  std::vector<float> usual(kMostCandidates), weights(kMostCandidates);
+  std::array<vfloat, kMaxCandidates + 1> x;
+  std::vector<float> usual(kMaxCandidates), weights(kMaxCandidates);
   std::copy(in.usual.begin(), in.usual.end(), usual.begin());
-  solve_mixture(m, sums.data(), usual.data(), in.usual_count, x.data());
+  solve_mixture(m, sums.data(), usual.data(), in.typical_count, x.data());
   for (int p = 0; p < m; ++p) weights[p] = x[p][0];
   return weights;
 }
@@ -118,7 +118,7 @@ std::vector<float> weights_everywhere(const MixtureInput& in, int m, const std::
 Image disagreement(const CandidateSet& set, const Image& guide, const Image& image,
                    const std::vector<unsigned char>& valid) {
   constexpr int kWindow = 5;
-  constexpr double kLeast = 1.0 / 30;
+  constexpr double kMin = 1.0 / 30;
   const int width = image.width, height = image.height;
   const size_t m = set.n_made();
   std::vector<Planes> means;
@@ -139,7 +139,7 @@ Image disagreement(const CandidateSet& set, const Image& guide, const Image& ima
     for (int x = 0; x < width; ++x) {
       double sum = 0, product = 1;
       for (const Planes& mean : means) sum += mean.row(0, y)[x];
-      const double least = kLeast * sum / static_cast<double>(m);
+      const double least = kMin * sum / static_cast<double>(m);
       for (const Planes& mean : means) product *= std::max<double>(mean.row(0, y)[x], least);
       *result.pixel(x, y) = static_cast<float>(std::pow(product, 1.0 / static_cast<double>(m)));
     }
@@ -150,8 +150,8 @@ Image disagreement(const CandidateSet& set, const Image& guide, const Image& ima
 Mixture mix(const MixtureInput& input) {
   const int m = static_cast<int>(input.whole->candidates.size());
   const int width = input.guide->width, height = input.guide->height;
-  COVARY_CHECK(m >= 1 && m <= kMostCandidates, "between one and kMostCandidates candidates");
-  COVARY_CHECK(input.usual_count == 0 || std::ssize(input.usual) == m, "a usual weight for each candidate");
+  COVARY_CHECK(m >= 1 && m <= kMaxCandidates, "between one and kMaxCandidates candidates");
+  COVARY_CHECK(input.typical_count == 0 || std::ssize(input.usual) == m, "a usual weight for each candidate");
   const GuidedCells cells(*input.guide, *input.valid, n_normal_sums(m),
                           [&](int x, int y, float* sums) { add_pixel(input, m, x, y, sums); });
   Mixture mixture;
@@ -165,11 +165,11 @@ Mixture mix(const MixtureInput& input) {
     }
     everywhere = weights_everywhere(input, m, rows);
   }
-  everywhere.resize(kMostCandidates);
+  everywhere.resize(kMaxCandidates);
   for_each_batch(width, height, [&](int x, int y, int n) {
     Sums sums;
     cells.sum(x, y, sums.data());
-    std::array<vfloat, kMostCandidates + 1> weights;
+    std::array<vfloat, kMaxCandidates + 1> weights;
     solve_mixture(m, sums.data(), everywhere.data(), input.prior, weights.data());
     for (int p = 0; p < m; ++p)
       for (int l = 0; l < n; ++l) mixture.weights[p].pixel(x + l, y)[0] = weights[p][l];

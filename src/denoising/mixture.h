@@ -20,7 +20,7 @@
 //
 // Where these sums are mostly noise, weights are shrunk towards x0, those of the whole image: prior * v ||x - x0||^2 is
 // added, with v the mean variance of the U_p, which vanishes with more samples. x0 in turn is shrunk towards typical
-// weights x1 by usual_count * v ||x0 - x1||^2, summed over the whole image, because halves of few samples overrate
+// weights x1 by typical_count * v ||x0 - x1||^2, summed over the whole image, because halves of few samples overrate
 // smooth images. Of large images, x0 is that of a sample of rows (in_sample()).
 //
 // The mixture of all samples has half that variance, which suggests bias_share = 2; but its bias is also smaller than
@@ -54,7 +54,7 @@ struct MixtureInput {
   float prior = 0;                                    ///< weight of the prior towards the whole image's weights, >= 0
   /// x1: typical weights of the candidates, >= 0, with a sum of at most 1; empty: none are known.
   std::vector<float> usual;
-  float usual_count = 0;  ///< weight of the prior towards these, >= 0
+  float typical_count = 0;  ///< weight of the prior towards these, >= 0
   /// Weights of each half's squared errors per pixel, one channel, made of the same half; null: 1 / (F'_A^2 + 0.01).
   std::array<const Image*, 2> counts = {};
   /// x0, if these are rows of a larger image; empty: of the rows of this image in the sample.
@@ -62,7 +62,7 @@ struct MixtureInput {
 };
 
 /// The normal equations of a row, summed over its pixels.
-using NormalRow = std::array<float, n_normal_sums(kMostCandidates)>;
+using NormalRow = std::array<float, n_normal_sums(kMaxCandidates)>;
 /// Those of rows first … end - 1. The input needs no image of all samples.
 std::vector<NormalRow> normal_rows(const MixtureInput& input, int first, int end);
 /// x0 from the sample's rows, with the input's prior towards `usual`; `m`: number of candidates.
@@ -72,10 +72,10 @@ std::vector<float> weights_everywhere(const MixtureInput& input, int m, const st
 struct SampledRows {
   int first = 0, end = 0;
 };
-/// The rows that determine x0: all, or of an image of more than kMostSampledPixels pixels, kSampledBlocks blocks,
+/// The rows that determine x0: all, or of an image of more than kMaxSampledPixels pixels, kSampledBlocks blocks,
 /// evenly distributed.
 std::vector<SampledRows> sampled_rows(int width, int height);
-inline constexpr double kMostSampledPixels = 1 << 21;
+inline constexpr double kMaxSampledPixels = 1 << 21;
 inline constexpr int kSampledBlocks = 8;
 
 struct Mixture {
@@ -91,7 +91,7 @@ struct Mixture {
 Image disagreement(const CandidateSet& set, const Image& guide, const Image& image,
                    const std::vector<unsigned char>& valid);
 
-/// The mixture of 1 to kMostCandidates candidates. Bit-identical for any number of threads.
+/// The mixture of 1 to kMaxCandidates candidates. Bit-identical for any number of threads.
 Mixture mix(const MixtureInput& input);
 
 }  // namespace covary

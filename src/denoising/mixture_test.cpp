@@ -177,7 +177,7 @@ TEST(Mixture, WeightsAreSharesOfOne) {
   const Experiment experiment(3);
   const auto many = [&](int half) {
     CandidateSet set{flat(0, 0.01, 7 + half), {}};
-    for (int p = 0; p < kMostCandidates; ++p)
+    for (int p = 0; p < kMaxCandidates; ++p)
       set.candidates.push_back(flat(0.02f * static_cast<float>(p), 0.005, 20 + 2 * p + half));
     return set;
   };

@@ -20,20 +20,20 @@ constexpr float kCountOfVariance = 2;
 
 /// Typical weights of a mean's candidates: those of least error with 16 samples if all pixels of all scenes have the
 /// same. Measured (docs/notes/denoising.md).
-struct UsualWeight {
+struct TypicalWeight {
   const char* name;
   float with_network, without;
 };
-constexpr UsualWeight kUsual[] = {{"oidn", 0.85f, 0},
-                                  {"oidn-wide", 0.05f, 0},
-                                  {"regression", 0, 0.9f},
-                                  {"sharp", 0.05f, 0.1f},
-                                  {"demodulated", 0.05f, 0.1f}};
+constexpr TypicalWeight kUsual[] = {{"oidn", 0.85f, 0},
+                                    {"oidn-wide", 0.05f, 0},
+                                    {"regression", 0, 0.9f},
+                                    {"sharp", 0.05f, 0.1f},
+                                    {"demodulated", 0.05f, 0.1f}};
 /// Those beside a candidate that consists of the others.
-constexpr UsualWeight kUsualBesideWeighed[] = {
+constexpr TypicalWeight kTypicalBesideWeighed[] = {
     {"regression", 0, 0.45f}, {"demodulated", 0, 0.05f}, {kWeighedName, 0, 0.5f}};
 
-/// MixtureInput::usual_count up to kSamplesOfUsual samples per pixel; with more, it falls inversely to their number.
+/// MixtureInput::typical_count up to kSamplesOfUsual samples per pixel; with more, it falls inversely to their number.
 constexpr float kCountOfUsual = 0.2f, kSamplesOfUsual = 16;
 
 /// The weights of squared errors of a half's noisy image, 1 / (G'^2 + 0.01 + 2 s^2), G: an image with little noise, s:
@@ -50,19 +50,21 @@ Image counts_of(const DenoisingPart& part, const Image& guide) {
   return counts;
 }
 
-float count_of_usual(double samples) {
+float typical_count_of(double samples) {
   return kCountOfUsual * static_cast<float>(std::min(1.0, kSamplesOfUsual / std::max(samples, 1.0)));
 }
 
 /// The typical weights of the candidates, with a sum of 1; empty if none is known.
-std::vector<float> usual_weights(const std::vector<CandidateMaker>& makers) {
+std::vector<float> typical_weights(const std::vector<CandidateMaker>& makers) {
   const bool network = has_network(makers), is_weighed = !makers.empty() && makers.back().shares;
-  const std::span<const UsualWeight> known = is_weighed ? std::span<const UsualWeight>(kUsualBesideWeighed) : kUsual;
+  const std::span<const TypicalWeight> known =
+      is_weighed ? std::span<const TypicalWeight>(kTypicalBesideWeighed) : kUsual;
   std::vector<float> weights;
   float sum = 0;
   for (const CandidateMaker& maker : makers)
     for (const std::string& name : maker.names) {
-      const auto usual = std::find_if(known.begin(), known.end(), [&](const UsualWeight& u) { return name == u.name; });
+      const auto usual =
+          std::find_if(known.begin(), known.end(), [&](const TypicalWeight& u) { return name == u.name; });
       weights.push_back(usual == known.end() ? 0 : network ? usual->with_network : usual->without);
       sum += weights.back();
     }
@@ -155,8 +157,8 @@ constexpr int kCellsReach = 32;  // of guided_cells.h
 void set_prior(bool is_mean, const std::vector<CandidateMaker>& makers, const PartsWeighting& chosen, double samples,
                MixtureInput& input) {
   input.prior = is_mean ? kPriorOfMean : chosen.prior;
-  if (is_mean) input.usual = usual_weights(makers);
-  if (!input.usual.empty()) input.usual_count = count_of_usual(samples);
+  if (is_mean) input.usual = typical_weights(makers);
+  if (!input.usual.empty()) input.typical_count = typical_count_of(samples);
 }
 
 /// What the weights follow from: both halves.

@@ -12,7 +12,7 @@ using namespace lanes;
 constexpr int kNewtonSteps = 24;
 constexpr float kTolerance = 1e-5f;  // relative residual of the equation
 /// Minimum variance, relative to the squared brightness, where there is no noise.
-constexpr float kLeastVariance = 1e-12f;
+constexpr float kMinVariance = 1e-12f;
 
 /// 1 / v_q and 3 sqrt(v_q) of every pixel for sigma = 1; pixels without samples have weight 0 and give no initial
 /// bound.
@@ -37,7 +37,7 @@ struct Precision {
   static float positive_variance(const FilterInput& input, int x, int y) {
     const Spectrum colour(input.dependent.row(0, y)[x], input.dependent.row(1, y)[x], input.dependent.row(2, y)[x]);
     const float brightness = std::min(colour_length(colour), 1e6f);
-    return std::max(input.variance.row(0, y)[x], kLeastVariance * (brightness * brightness + kLeastVariance));
+    return std::max(input.variance.row(0, y)[x], kMinVariance * (brightness * brightness + kMinVariance));
   }
 };
 

@@ -158,9 +158,9 @@ Image filter_and_combine(const GroupedImage& crn, const GroupedImage& independen
 
 /// Rows in a band, without the surrounding ones it needs; small bands would spend most time on the latter.
 int rows_of_band(int width, int reach) {
-  constexpr int kFewest = 64;
+  constexpr int kMin = 64;
   const double rows = kDependentTestsBand / (kDependentTestsBytesPerPixel * width);
-  return std::max(kFewest, static_cast<int>(rows) - 2 * reach);
+  return std::max(kMin, static_cast<int>(rows) - 2 * reach);
 }
 
 }  // namespace
@@ -279,7 +279,7 @@ Method make_dependent_tests(Settings& p) {
   const auto [o, adaptive] = declare_dependent_tests(p);
   Method estimator;
   estimator.summary = "dependent tests driven filtering";
-  estimator.fewest_groups = 2;
+  estimator.min_groups = 2;
   estimator.adaptive = adaptive;
   estimator.reach = dependent_tests_reach(o);
   estimator.memory.always = kDependentTestsBytesPerPixel;

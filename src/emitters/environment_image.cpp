@@ -206,21 +206,21 @@ EnvironmentImage::Sample EnvironmentImage::sample(Vec2 u) const {
 }
 
 void EnvironmentImage::sample(EnvironmentSamples& samples) const {
-  constexpr int kMost = EnvironmentSamples::kCapacity;
+  constexpr int kMax = EnvironmentSamples::kCapacity;
   const int n = samples.size;
   if (black_) {
     for (int l = 0; l < n; ++l) samples.pdf_solid_angle[l] = 0;
     return;
   }
   // Memory accesses of a step overlap: entries of the tables, then texels.
-  Discrete::Result block_rows[kMost];
+  Discrete::Result block_rows[kMax];
   for (int l = 0; l < n; ++l) {
     block_rows[l] = block_rows_.sample(samples.u_y[l]);
     block_columns_[block_rows[l].index].prefetch(samples.u_x[l]);
   }
-  alignas(64) float weights[kBlock][kMost] = {}, rest_x[kMost] = {}, rest_y[kMost] = {};
-  alignas(64) int column[kMost] = {}, row[kMost] = {};
-  const Texel* texels[kMost];
+  alignas(64) float weights[kBlock][kMax] = {}, rest_x[kMax] = {}, rest_y[kMax] = {};
+  alignas(64) int column[kMax] = {}, row[kMax] = {};
+  const Texel* texels[kMax];
   for (int l = 0; l < n; ++l) {
     const AliasTable::Result found = block_columns_[block_rows[l].index].sample(samples.u_x[l]);
     column[l] = static_cast<int>(found.index) * kBlock, row[l] = static_cast<int>(block_rows[l].index) * kBlock;
@@ -232,15 +232,15 @@ void EnvironmentImage::sample(EnvironmentSamples& samples) const {
     const std::array<float, kBlock> rows = row_weights(texels[l], row[l]);
     for (int i = 0; i < kBlock; ++i) weights[i][l] = rows[i];
   }
-  alignas(64) int row_in_block[kMost] = {}, column_in_block[kMost] = {};
+  alignas(64) int row_in_block[kMax] = {}, column_in_block[kMax] = {};
   choose_cells(n, weights, rest_y, row_in_block);
   for (int l = 0; l < n; ++l) {
     for (int i = 0; i < kBlock; ++i) weights[i][l] = texels[l][row_in_block[l] * kBlock + i].weight;
     row[l] += row_in_block[l];
   }
   choose_cells(n, weights, rest_x, column_in_block);
-  alignas(64) float sine[kMost], right[kMost], below[kMost];
-  alignas(64) int next[kMost];
+  alignas(64) float sine[kMax], right[kMax], below[kMax];
+  alignas(64) int next[kMax];
   const int width = width_, height = height_;
   for (int first = 0; first < n; first += kLanes) {
 #pragma GCC ivdep
@@ -253,7 +253,7 @@ void EnvironmentImage::sample(EnvironmentSamples& samples) const {
       column[l] = cell.column, next[l] = cell.next, row[l] = cell.row, right[l] = cell.right, below[l] = cell.below;
     }
   }
-  Corners corners[kMost];
+  Corners corners[kMax];
   for (int l = 0; l < n; ++l) {
     corners[l] = corners_of(column[l], next[l], row[l]);
     for (const Texel* corner : corners[l]) __builtin_prefetch(corner);

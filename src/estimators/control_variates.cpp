@@ -22,7 +22,7 @@ using namespace lanes;
 constexpr int kTileWidth = 64, kTileHeight = 32;
 /// Minimum fraction of the degrees of freedom assumed to remain after a fit, for the error estimate; a fit with less is
 /// an interpolation.
-constexpr float kFewestFreedom = 0.1f;
+constexpr float kMinFreedom = 0.1f;
 
 /// Scratch memory of one thread.
 struct Workspace {
@@ -302,7 +302,7 @@ class Regression {
   vfloat crn_variance(int c, const Workspace& w) const {
     const vfloat squares = batch::residual_squares(w.x.data() + c, layout_.contrasts, 3, w.y.data() + c, w.gamma.data(),
                                                    s_.k, layout_.group_contrasts / 3);
-    const vfloat left = max(1.0f - w.freedom, splat(kFewestFreedom));
+    const vfloat left = max(1.0f - w.freedom, splat(kMinFreedom));
     vfloat missing = tail_value(w.y_tail.data(), layout_.missing + c);
     for (int i = 0; i < s_.k; ++i)
       missing = fnma(w.beta[i], tail_value(w.tail.data() + i * (layout_.size - layout_.contrasts), layout_.missing + c),

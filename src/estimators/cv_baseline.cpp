@@ -61,7 +61,7 @@ Method make_cv_baseline(Settings& parameters) {
   estimator.summary = "control variates that ignore the errors of the independent image";
   estimator.predicts_error = true;
   estimator.reliable_samples = kReliableSamples;
-  estimator.fewest_groups = 3;
+  estimator.min_groups = 3;
   estimator.reach = o.window / 2 + kMissingWindow / 2;
   estimator.memory.always = kCvBaselineBytesPerPixel;
   return estimator;

@@ -192,7 +192,7 @@ Method make_iduw(Settings& parameters) {
   Method estimator;
   estimator.passes = pair;
   estimator.summary = "input-dependent uncorrelated weighting";
-  estimator.fewest_groups = 4;
+  estimator.min_groups = 4;
   estimator.reach = -1;
   estimator.memory.always = kIduwBytesPerPixel;
   return estimator;

@@ -106,7 +106,7 @@ IicvOptions declare_iicv(Settings& p) {
 Method make_iicv(Settings& p) {
   const IicvOptions o = declare_iicv(p);
   AdaptiveSampling standard;
-  standard.most_first_spp = std::numeric_limits<int>::max();
+  standard.max_first_spp = std::numeric_limits<int>::max();
   standard.reads_groups = true;
   Method estimator;
   estimator.passes = pair_by(iicv, o);
@@ -118,7 +118,7 @@ Method make_iicv(Settings& p) {
   // Without it, the bias of a half exceeds that of the whole by too much (docs/methods/error-estimates.md).
   estimator.holds_out = o.residual_correction;
   estimator.reliable_samples = kReliableSamples;
-  estimator.fewest_groups = 3;
+  estimator.min_groups = 3;
   estimator.reach = iicv_reach(o);
   estimator.memory.always = iicv_bytes_per_pixel(o);
   return estimator;

@@ -126,7 +126,7 @@ struct Method {
   std::variant<OnePass, PassPair, PixelPass> passes;
   std::optional<AdaptiveSampling> adaptive;  ///< never set for PixelPass
   /// Minimum number of groups in each pass. All methods accept groups whose sizes differ by one sample.
-  int fewest_groups = 1;
+  int min_groups = 1;
 
   bool predicts_error = false;  ///< whether it predicts the error of its image
   /// Whether held-out samples tell the error of its image (held_out_error.h).

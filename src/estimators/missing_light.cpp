@@ -15,7 +15,7 @@ using namespace lanes;
 /// Squared number of standard deviations by which a difference must exceed noise.
 constexpr float kSignificant = 9;
 /// Same where the CRN image does not tell its own noise: a difference due to K bright pixels alone reaches K.
-constexpr float kLeastSignificant = 2;
+constexpr float kMinSignificant = 2;
 /// Smallest credible variance of a CRN pixel, relative to that of an independent one.
 constexpr float kCredible = 0.01f;
 /// Squared difference tolerated between similar pixels, relative to the missing light.
@@ -95,7 +95,7 @@ Planes missing_light(const Moments& g, const Moments& h, const std::vector<unsig
     const Difference d = guided_difference(g, h, variance_of_h, x, y, own + load(alike.row(0, y) + x));
     const vfloat squares = d.mean[0] * d.mean[0] + d.mean[1] * d.mean[1] + d.mean[2] * d.mean[2];
     const vfloat known = min(own / max(kCredible * d.of_pixel, splat(1e-30f)), splat(1));
-    const vfloat noise = max(kSignificant * known, splat(kLeastSignificant)) * (own + d.variance);
+    const vfloat noise = max(kSignificant * known, splat(kMinSignificant)) * (own + d.variance);
     const vfloat beyond = lanes::sqrt(max(1.0f - noise / max(squares, splat(1e-30f)), vfloat{}));
     const vfloat brighter = d.mean[0] + d.mean[1] + d.mean[2] > 0.0f ? beyond : vfloat{};
     const vfloat part = own > 0.0f ? brighter : splat(1);

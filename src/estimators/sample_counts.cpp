@@ -14,12 +14,12 @@
 namespace covary {
 namespace {
 
-constexpr uint32_t kMost = 1u << 30;  // maximum samples of any pixel
-constexpr double kOffset = 0.01;      // of squared brightness
-constexpr double kLeastShare = 0.7, kLargestShare = 2;
+constexpr uint32_t kMax = 1u << 30;  // maximum samples of any pixel
+constexpr double kOffset = 0.01;     // of squared brightness
+constexpr double kMinShare = 0.7, kLargestShare = 2;
 constexpr double kDamping = 0.5;  // exponent of e for least-error
 // Limits and window of kDenoised.
-constexpr double kLeastOfFiltered = 0.5, kLargestOfFiltered = 4;
+constexpr double kMinOfFiltered = 0.5, kLargestOfFiltered = 4;
 constexpr int kFilteredWindow = 15;
 constexpr int kBisections = 60;
 
@@ -105,7 +105,7 @@ Demand demand_of(const GroupedImage& image, const CountOptions& options, std::sp
   const bool is_filtered = options.allocation == Allocation::kDenoised;
   std::vector<double> errors = is_filtered ? smoothed(filtered, image) : squared_errors(image, options);
   const double mean_square = mean_of(errors);
-  const double damping = is_filtered ? 1 : kDamping, least = is_filtered ? kLeastOfFiltered : kLeastShare;
+  const double damping = is_filtered ? 1 : kDamping, least = is_filtered ? kMinOfFiltered : kMinShare;
   const double largest = is_filtered ? kLargestOfFiltered : kLargestShare;
   for (double& e : errors) e = options.allocation == Allocation::kUniform ? 1 : std::pow(e, damping / 2);
   if (const double mean = mean_of(errors); mean > 0)
@@ -129,7 +129,7 @@ class Rounding {
       : options_(options), multiple_(multiple), classes_(options.classes && !all_equal(options)) {}
 
   uint32_t operator()(double samples) const {
-    const double most = options_.max_spp ? std::min<double>(*options_.max_spp, kMost) : kMost;
+    const double most = options_.max_spp ? std::min<double>(*options_.max_spp, kMax) : kMax;
     const double wanted = std::clamp(samples, 0.0, most);
     const auto whole = classes_ ? class_of(wanted) : static_cast<uint32_t>(rounded_up(wanted));
     const auto limited = std::clamp(whole, static_cast<uint32_t>(options_.min_spp), static_cast<uint32_t>(most));
@@ -186,10 +186,10 @@ std::vector<uint32_t> counts_within(const Demand& demand, double total, const Ro
 
 uint32_t class_of(double samples) {
   if (samples <= 1) return samples > 1e-6 ? 1 : 0;
-  for (uint64_t decade = 10; decade < kMost; decade *= 10)
+  for (uint64_t decade = 10; decade < kMax; decade *= 10)
     for (const uint64_t step : {1, 2, 5})
       if (samples <= static_cast<double>(decade * step)) return static_cast<uint32_t>(decade * step);
-  return kMost;
+  return kMax;
 }
 
 void CountOptions::check_limits(uint32_t multiple) const {

@@ -39,10 +39,10 @@
 
 namespace covary {
 
-enum class Allocation { kEqualError, kVariance, kLeastError, kUniform, kDenoised };
+enum class Allocation { kEqualError, kVariance, kMinError, kUniform, kDenoised };
 
 struct CountOptions {
-  Allocation allocation = Allocation::kLeastError;
+  Allocation allocation = Allocation::kMinError;
   std::optional<float> relative_error;  ///< eps > 0
   int min_spp = 1;                      ///< minimum per pixel, >= 0
   std::optional<int> max_spp;           ///< maximum per pixel, >= min_spp and 1; default: no limit
@@ -80,8 +80,8 @@ uint32_t class_of(double samples);
 /// otherwise a pilot, an independent pass that is not part of the image, so that the mean stays unbiased.
 struct AdaptiveSampling {
   CountOptions counts;
-  std::optional<int> first_spp;  ///< of the first pass, >= 1; default: half of the budget, at most most_first_spp
-  int most_first_spp = 50;
+  std::optional<int> first_spp;  ///< of the first pass, >= 1; default: half of the budget, at most max_first_spp
+  int max_first_spp = 50;
   bool reads_groups = false;  ///< the estimator needs group means, not only the sample variance
 };
 

@@ -63,7 +63,7 @@ TEST(SampleCounts, ClassesAreThoseOfThePaperAndGoOn) {
 
 TEST(SampleCounts, MeetTheBudget) {
   const test::Grouped image = noisy_first_pass();
-  for (const Allocation allocation : {Allocation::kEqualError, Allocation::kLeastError, Allocation::kUniform})
+  for (const Allocation allocation : {Allocation::kEqualError, Allocation::kMinError, Allocation::kUniform})
     for (const bool classes : {false, true})
       for (const double budget : {3.0, 17.5, 46.0, 900.0}) {
         CountOptions options = options_of(allocation);
@@ -88,7 +88,7 @@ TEST(SampleCounts, UniformIsTheSameForAll) {
 
 TEST(SampleCounts, KeepToTheLargestNumberInMultiplesToo) {
   const test::Grouped image = noisy_first_pass();
-  CountOptions options = options_of(Allocation::kLeastError);
+  CountOptions options = options_of(Allocation::kMinError);
   options.max_spp = 31;
   for (const uint32_t n : sample_counts(image.view(), 900, options, 12)) ASSERT_EQ(n, 24u);
   const auto message = [&] { return message_of([&] { sample_counts(image.view(), 900, options, 12); }); };
@@ -100,7 +100,7 @@ TEST(SampleCounts, KeepToTheLargestNumberInMultiplesToo) {
 
 TEST(SampleCounts, SayWhetherTheRelativeErrorIsReached) {
   const test::Grouped image = noisy_first_pass();
-  for (const Allocation allocation : {Allocation::kEqualError, Allocation::kLeastError, Allocation::kUniform}) {
+  for (const Allocation allocation : {Allocation::kEqualError, Allocation::kMinError, Allocation::kUniform}) {
     CountOptions options = options_of(allocation);
     EXPECT_TRUE(have_relative_error(image.view(), sample_counts(image.view(), 9, options), options));
     options.relative_error = 0.5f;
@@ -157,7 +157,7 @@ TEST(SampleCounts, CanBeProportionalToVarianceOverColour) {
 
 TEST(SampleCounts, LeastErrorIsProportionalToTheRootOfRelativeDeviation) {
   const test::Grouped image = noisy_first_pass();
-  const std::vector<uint32_t> counts = sample_counts(image.view(), 10000, options_of(Allocation::kLeastError));
+  const std::vector<uint32_t> counts = sample_counts(image.view(), 10000, options_of(Allocation::kMinError));
   const auto ratio = [&](int p) {
     const float* v = image.view().pixel(p % kWidth, p / kWidth);
     const double C = 1.5 * (double{v[0]} + v[3]), sigma = 3 * std::abs(double{v[0]} - v[3]) / std::sqrt(2.0);
@@ -212,13 +212,13 @@ TEST(SampleCounts, KeepLimits) {
 TEST(SampleCounts, OfImagesWithoutNoise) {
   for (const float value : {0.0f, 1.0f}) {  // black, too
     const test::Grouped image = test::constant_image(8, 8, 2, value);
-    for (const uint32_t n : sample_counts(image.view(), 20, options_of(Allocation::kLeastError))) EXPECT_EQ(n, 20u);
+    for (const uint32_t n : sample_counts(image.view(), 20, options_of(Allocation::kMinError))) EXPECT_EQ(n, 20u);
     CountOptions paper = options_of(Allocation::kEqualError);
     paper.min_spp = 0;
     for (const uint32_t n : sample_counts(image.view(), 20, paper)) EXPECT_EQ(n, 0u);
   }
   const test::Grouped one = test::constant_image(4, 4, 1, 1);
-  for (const uint32_t n : sample_counts(one.view(), 20, options_of(Allocation::kLeastError))) EXPECT_EQ(n, 20u);
+  for (const uint32_t n : sample_counts(one.view(), 20, options_of(Allocation::kMinError))) EXPECT_EQ(n, 20u);
 }
 
 /// Equal pixels cannot all be rounded to the budget: some get the next class.
@@ -236,7 +236,7 @@ TEST(SampleCounts, PixelsThatAreNotFiniteHaveNoNoise) {
   test::Grouped image = noisy_first_pass();
   image.data[1] = std::numeric_limits<float>::quiet_NaN();
   image.data[7] = std::numeric_limits<float>::infinity();
-  const std::vector<uint32_t> counts = sample_counts(image.view(), 30, options_of(Allocation::kLeastError));
+  const std::vector<uint32_t> counts = sample_counts(image.view(), 30, options_of(Allocation::kMinError));
   EXPECT_NEAR(mean(counts), 30, 0.3);
 }
 

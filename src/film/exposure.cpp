@@ -8,7 +8,7 @@ namespace covary {
 namespace {
 
 constexpr double kBurnt = 1.001, kBlack = 0.0015;
-constexpr int kMostHalfStops = 60;
+constexpr int kMaxHalfStops = 60;
 
 }  // namespace
 
@@ -31,12 +31,12 @@ double exposure_for_display(const Image& linear) {
   const auto is_good = [&](double stops) {
     return static_cast<double>(n_lost(stops)) <= 0.1 * static_cast<double>(logs.size());
   };
-  for (int half = 0; half <= kMostHalfStops; ++half)
+  for (int half = 0; half <= kMaxHalfStops; ++half)
     if (is_good(-half / 2.0)) return half == 0 ? 0 : -half / 2.0;
   const double key = std::log2(0.18) - sum / static_cast<double>(logs.size());
   double best = 0;
   auto fewest = n_lost(0);
-  for (int half = -kMostHalfStops; half <= kMostHalfStops; ++half) {
+  for (int half = -kMaxHalfStops; half <= kMaxHalfStops; ++half) {
     const double stops = half / 2.0;
     const auto lost = n_lost(stops);
     if (lost < fewest || (lost == fewest && std::abs(stops - key) < std::abs(best - key))) best = stops, fewest = lost;

@@ -246,7 +246,7 @@ std::vector<uint32_t> ExrFile::checksums_of(std::span<const std::string> channel
 }
 
 void ExrFile::check_pixels() const {
-  double file_values = 0, least_bytes = 0, memory = 0;
+  double file_values = 0, min_bytes = 0, memory = 0;
   for (const auto& [name, where] : handle_->parts) {
     if (where.first == kNoPart) continue;
     const Imf::Header& header = handle_->file.header(where.first);
@@ -255,12 +255,12 @@ void ExrFile::check_pixels() const {
         (static_cast<double>(window.max.x) - window.min.x + 1) * (static_cast<double>(window.max.y) - window.min.y + 1);
     const double bytes = header.channels().findChannel(where.second)->type == Imf::HALF ? 2 : 4;
     file_values += 1, memory += n_pixels * sizeof(float);
-    least_bytes += n_pixels * bytes / largest_ratio(compression_name(header.compression()));
+    min_bytes += n_pixels * bytes / largest_ratio(compression_name(header.compression()));
   }
   const double all_memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
   std::error_code ignored;
   const double file_bytes = static_cast<double>(std::filesystem::file_size(path_, ignored));
-  if (memory > all_memory || least_bytes > file_bytes)
+  if (memory > all_memory || min_bytes > file_bytes)
     fail_input(path_,
                fmt::format("the header says {} x {} pixels of {} channels, more than a file of {:.0f} bytes with "
                            "compression '{}' or the memory can hold",

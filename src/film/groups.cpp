@@ -8,11 +8,11 @@
 namespace covary {
 
 int choose_groups(std::span<const uint32_t> counts) {
-  constexpr uint32_t kMost = 12, kFewestEqual = 8;
-  for (uint32_t groups = kMost; groups >= kFewestEqual; --groups)
+  constexpr uint32_t kMax = 12, kMinEqual = 8;
+  for (uint32_t groups = kMax; groups >= kMinEqual; --groups)
     if (std::all_of(counts.begin(), counts.end(), [&](uint32_t n) { return n > 0 && n % groups == 0; }))
       return static_cast<int>(groups);
-  uint32_t groups = kMost;
+  uint32_t groups = kMax;
   for (uint32_t n : counts) groups = std::min(groups, n);
   return static_cast<int>(std::max(groups, 1u));
 }

@@ -185,7 +185,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMostOpen = 64;  // the handler ignores further files; the next create() for their target removes them
+constexpr size_t kMaxOpen = 64;  // the handler ignores further files; the next create() for their target removes them
 constexpr const char* kEnding = ".part";
 
 /// A path without allocation, for the signal handler.
@@ -194,12 +194,12 @@ struct Slot {
   std::atomic<int> state{kFree};
   std::array<char, PATH_MAX> path{};
 };
-std::array<Slot, kMostOpen> g_slots;
+std::array<Slot, kMaxOpen> g_slots;
 static_assert(std::atomic<int>::is_always_lock_free);
 
 int remember(const std::string& path) {
   if (path.size() >= PATH_MAX) return -1;
-  for (size_t i = 0; i < kMostOpen; ++i) {
+  for (size_t i = 0; i < kMaxOpen; ++i) {
     int free = Slot::kFree;
     if (!g_slots[i].state.compare_exchange_strong(free, Slot::kTaken)) continue;
     std::memcpy(g_slots[i].path.data(), path.c_str(), path.size() + 1);

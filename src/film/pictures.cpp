@@ -114,10 +114,10 @@ std::vector<Picture> layers_named(const std::string& path, const std::vector<Exr
 
 /// The names, at most 20 of them.
 std::string listed(const std::vector<std::string>& names, const char* separator) {
-  constexpr size_t kMostNamed = 20;
-  const auto n = static_cast<ptrdiff_t>(std::min(names.size(), kMostNamed));
+  constexpr size_t kMaxNamed = 20;
+  const auto n = static_cast<ptrdiff_t>(std::min(names.size(), kMaxNamed));
   const std::string text = fmt::format("{}", fmt::join(names.begin(), names.begin() + n, separator));
-  return names.size() > kMostNamed ? text + separator + "…" : text;
+  return names.size() > kMaxNamed ? text + separator + "…" : text;
 }
 
 /// What a file holds, for messages.

@@ -18,8 +18,8 @@ constexpr int kSweeps = 24;
 
 /// By exact line search along the edge between each pair of candidates. The base image, number m, has zero rows.
 void solve_mixture(int m, const vfloat* sums, const float* prior, float strength, vfloat* x) {
-  std::array<std::array<vfloat, kMostCandidates>, kMostCandidates> a;
-  std::array<vfloat, kMostCandidates> b;
+  std::array<std::array<vfloat, kMaxCandidates>, kMaxCandidates> a;
+  std::array<vfloat, kMaxCandidates> b;
   int plane = 0;
   for (int p = 0; p < m; ++p)
     for (int q = p; q < m; ++q, ++plane) a[p][q] = a[q][p] = sums[plane];
@@ -31,7 +31,7 @@ void solve_mixture(int m, const vfloat* sums, const float* prior, float strength
     a[p][p] += ridge;
     if (prior) b[p] += ridge * prior[p];
   }
-  std::array<vfloat, kMostCandidates + 1> gradient;
+  std::array<vfloat, kMaxCandidates + 1> gradient;
   for (int p = 0; p < m; ++p) {
     x[p] = splat(1.0f / static_cast<float>(m + 1));
     gradient[p] = -b[p];

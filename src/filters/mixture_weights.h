@@ -7,7 +7,7 @@
 namespace covary {
 
 /// Maximum number of candidates around a base image.
-inline constexpr int kMostCandidates = 8;
+inline constexpr int kMaxCandidates = 8;
 
 /// Number of sums in the normal equations of m candidates: the upper triangle of A row by row, b, and v.
 constexpr int n_normal_sums(int m) { return m * (m + 1) / 2 + m + 1; }

@@ -187,14 +187,14 @@ class Filter {
     copy_tile(tile, b);
     b.totals.resize(tile.height * kSums * n_totals_ * kRow);
     for (int y = 0; y < tile.height; ++y) add_own(tile, y, b);
-    const int most_x = std::min(kNlMeansRadius, width_ - 1), most_y = std::min(kNlMeansRadius, height_ - 1);
+    const int max_x = std::min(kNlMeansRadius, width_ - 1), max_y = std::min(kNlMeansRadius, height_ - 1);
     for (int band = std::max(-kNlMeansRadius, -tile.y - first_row_); band < tile.height; band += kBand)
-      for (int dy = 0; dy <= most_y; ++dy) {
+      for (int dy = 0; dy <= max_y; ++dy) {
         const int first = std::max({band, -dy, -tile.y});
         const int end = std::min({band + kBand, tile.height, height_ - tile.y - dy});
         if (first >= end) continue;
-        for (int dx = dy == 0 ? 1 : -most_x; dx <= most_x; dx += kAtOnce)
-          add_pairs(tile, first, end, {dx, dy, std::min(kAtOnce, most_x + 1 - dx)}, b);
+        for (int dx = dy == 0 ? 1 : -max_x; dx <= max_x; dx += kAtOnce)
+          add_pairs(tile, first, end, {dx, dy, std::min(kAtOnce, max_x + 1 - dx)}, b);
       }
     for (int y = std::max(0, -tile.y); y < tile.height; ++y) finish(tile, y, totals(b, y));
   }

@@ -23,11 +23,11 @@ constexpr float kBandwidth = 0.5f, kOfPatch = 27;
 constexpr float kRidge = 5e-4f, kRidgeOfPosition = 1e-3f, kPlaceUnit = 6, kOfOther = 1;
 constexpr float kSmallestVariance = 1e-10f, kLargestVariance = 1e30f;
 /// Terms of a model: constant, columns, rows, features, position.
-constexpr int kMostTerms = 3 + kMostFeatures + 3;
+constexpr int kMaxTerms = 3 + kMaxFeatures + 3;
 
-using Terms = std::array<vfloat, kMostTerms>;
+using Terms = std::array<vfloat, kMaxTerms>;
 /// For pixels at all offsets in a row of windows.
-using RowTerms = std::array<std::array<vfloat, kSide>, kMostTerms>;
+using RowTerms = std::array<std::array<vfloat, kSide>, kMaxTerms>;
 
 /// Plane and column of the pixels `dx` columns from the centres.
 template <int kStep>
@@ -52,7 +52,7 @@ class Regression {
         n_terms_(3),
         n_sources_(static_cast<int>(input.sources.size())) {
     for (const Image* feature : features) n_terms_ += feature->channels;
-    COVARY_CHECK(n_terms_ <= 3 + kMostFeatures, "at most kMostFeatures");
+    COVARY_CHECK(n_terms_ <= 3 + kMaxFeatures, "at most kMaxFeatures");
     COVARY_CHECK(input.first_row % kRegressionCell == 0, "rows begin with a row of windows");
     first_of_position_ = n_terms_;
     if (in_.position) n_terms_ += 3;

@@ -18,7 +18,7 @@
 namespace covary {
 
 /// Maximum number of features of a pixel, beside its position.
-inline constexpr int kMostFeatures = 9;
+inline constexpr int kMaxFeatures = 9;
 
 /// Steering image and its standard error; the images fitted with the same weights and, for each, another filter's
 /// image.
@@ -37,7 +37,7 @@ inline constexpr int kRegressionCell = 12;   ///< the windows of both kinds begi
 inline constexpr int kRegressionReach = 22;  ///< radius of influence of the input on a pixel, in rows or columns
 
 /// The filtered sources. All images must have three channels, the same size and finite values; results may be negative,
-/// as models are. Linear in sources and others. `features`: up to kMostFeatures channels, with values of order 1.
+/// as models are. Linear in sources and others. `features`: up to kMaxFeatures channels, with values of order 1.
 /// `valid`: pixels with 0 are not fitted, and keep the other image. Bit-identical for any number of threads.
 std::vector<Image> regressed(const RegressionInput& input, std::span<const Image* const> features,
                              const std::vector<unsigned char>& valid);

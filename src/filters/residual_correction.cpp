@@ -24,7 +24,7 @@ constexpr float kWidening = 4, kSecondWidening = 12;
 constexpr float kNoise = 0.2f;
 /// Variance of a wide mean, relative to that of the estimate, at which half of it is restored.
 constexpr float kWideNoise = 1;
-constexpr float kLeastSquare = 1e-4f;  // minimum squared bandwidth of the residual
+constexpr float kMinSquare = 1e-4f;  // minimum squared bandwidth of the residual
 
 /// Cells of side x side pixels with the guide F^: sums over the valid pixels of n (h - F^), n and n^2 var h (over RGB),
 /// where n is the pixel's count relative to the image's mean.
@@ -134,7 +134,7 @@ void add_residual(const Moments& h, const ResidualOptions& options, const std::v
       for (int l = 0; l < kLanes; ++l) f[c][l] = estimate.pixel(std::min(x + l, estimate.width - 1), y)[c];
       brightness += f[c] * (options.bandwidth / 3);
     }
-    const GuidedMean mean = mean_around(cells, radius, x, y, f, brightness * brightness + kLeastSquare);
+    const GuidedMean mean = mean_around(cells, radius, x, y, f, brightness * brightness + kMinSquare);
     for (int l = 0; l < n; ++l)
       if (valid[static_cast<size_t>(y) * estimate.width + x + l])
         for (int c = 0; c < 3; ++c) estimate.pixel(x + l, y)[c] += mean.value(c)[l];

@@ -38,18 +38,18 @@ std::vector<unsigned char> bad_pixels(const Image& image) {
     bad[p] = !are_usable(&image.data[3 * p]);
     if (!bad[p]) brightnesses[p] = brightness(&image.data[3 * p]);
   }
-  if (bad.size() <= kMostStrays) return bad;
+  if (bad.size() <= kMaxStrays) return bad;
   std::vector<float> ordered = brightnesses;
-  const auto rest = ordered.begin() + kMostStrays;
+  const auto rest = ordered.begin() + kMaxStrays;
   std::nth_element(ordered.begin(), rest, ordered.end(), std::greater<>());
   double light = kDarkestPixel * static_cast<double>(bad.size());
   for (auto it = rest; it != ordered.end(); ++it) light += *it;
   std::vector<size_t> strays;
   for (size_t p = 0; p < bad.size(); ++p) {
     const int x = static_cast<int>(p % image.width), y = static_cast<int>(p / image.width);
-    if (brightnesses[p] > kMostOfPicture * light && stands_out(image, brightnesses, x, y)) strays.push_back(p);
+    if (brightnesses[p] > kMaxOfPicture * light && stands_out(image, brightnesses, x, y)) strays.push_back(p);
   }
-  if (strays.size() < kMostStrays)
+  if (strays.size() < kMaxStrays)
     for (const size_t p : strays) bad[p] = 1;
   return bad;
 }
@@ -89,8 +89,8 @@ void StrayValues::add_rows(const GroupedImage& image) {
       }
       light_ += (light - largest.brightness) / (image.groups - 1) + kDarkestPixel;
       if (second > kConfirmed * largest.brightness || largest.group < 0) continue;
-      if (brightest_.size() == kMostStrays && largest.brightness <= brightest_.front().brightness) continue;
-      if (brightest_.size() == kMostStrays) {
+      if (brightest_.size() == kMaxStrays && largest.brightness <= brightest_.front().brightness) continue;
+      if (brightest_.size() == kMaxStrays) {
         std::pop_heap(brightest_.begin(), brightest_.end(), is_darker);
         brightest_.pop_back();
       }
@@ -101,8 +101,8 @@ void StrayValues::add_rows(const GroupedImage& image) {
 
 std::vector<StrayValue> StrayValues::found() const {
   std::vector<StrayValue> strays = brightest_;
-  std::erase_if(strays, [&](const StrayValue& s) { return !(s.brightness > kMostOfPicture * light_ * groups_); });
-  if (strays.size() == kMostStrays) return {};
+  std::erase_if(strays, [&](const StrayValue& s) { return !(s.brightness > kMaxOfPicture * light_ * groups_); });
+  if (strays.size() == kMaxStrays) return {};
   std::sort(strays.begin(), strays.end(), [](const StrayValue& a, const StrayValue& b) {
     return std::tuple(-a.brightness, a.y, a.x) < std::tuple(-b.brightness, b.y, b.x);
   });

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Values that no estimate can use: a single group of one pixel that outshines the whole picture. If light of
 // such samples made up as much of the picture as everything else, n pixels of brightness m would hold n m T / v groups
-// of T with the value v: less than one in kMostOfPicture. Such values come from divisions by nearly 0; with one of
+// of T with the value v: less than one in kMaxOfPicture. Such values come from divisions by nearly 0; with one of
 // them, held-out samples judge nothing else.
 #pragma once
 
@@ -13,10 +13,10 @@ namespace covary {
 
 /// A value is stray if, times 1 / T for one of T groups, it outshines the picture so many times: the sum over pixels of
 /// the brightness by all but the brightest group, black pixels counting as 0.1, as in relMSE.
-inline constexpr double kMostOfPicture = 1e4;
+inline constexpr double kMaxOfPicture = 1e4;
 
 /// A picture with more stray values is like that.
-inline constexpr size_t kMostStrays = 64;
+inline constexpr size_t kMaxStrays = 64;
 
 struct StrayValue {
   int x = 0, y = 0, group = 0;
@@ -43,7 +43,7 @@ void leave_out(const std::vector<StrayValue>& strays, int first_row, int n_rows,
 
 /// An image with 3 channels in which pixels with values that are not usable, or stray, become the mean of the
 /// others around them, in the smallest square that has some; 0 if there are none. Without another group, a value
-/// is stray if it outshines kMostOfPicture times all but the brightest kMostStrays pixels, and the eight pixels around,
+/// is stray if it outshines kMaxOfPicture times all but the brightest kMaxStrays pixels, and the eight pixels around,
 /// too. `replaced`: these pixels; may be null.
 Image with_usable_values(Image image, std::vector<StrayValue>* replaced = nullptr);
 

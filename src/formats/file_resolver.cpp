@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr size_t kMostEntries = 2000;  // of a folder that are looked at
+constexpr size_t kMaxEntries = 2000;  // of a folder that are looked at
 
 /// Calls visit(path) for entries of the folder.
 template <typename Visit>
@@ -37,7 +37,7 @@ void for_entries(const fs::path& folder, const Visit& visit) {
   size_t n = 0;
   for (fs::directory_iterator it(folder.empty() ? fs::path(".") : folder, error), end; !error && it != end;
        it.increment(error)) {
-    if (++n > kMostEntries) break;
+    if (++n > kMaxEntries) break;
     visit(it->path());
   }
 }

@@ -18,8 +18,8 @@
 namespace covary {
 namespace {
 
-constexpr size_t kMostObjects = 1000000;
-constexpr int64_t kHeight = 720, kMostWidth = 7200, kSamples = 64;  // the file only gives the aspect ratio
+constexpr size_t kMaxObjects = 1000000;
+constexpr int64_t kHeight = 720, kMaxWidth = 7200, kSamples = 64;  // the file only gives the aspect ratio
 constexpr double kDegrees = 180 / M_PI;
 
 /// glTF's cameras and lights look along -z, ours along +z.
@@ -127,7 +127,7 @@ class Reader {
   ObjectBuilder make_sensor(const char* type, double aspect) {
     auto film = make_object("film", "hdrfilm", file_.where());
     const double width = std::round(static_cast<double>(kHeight) * aspect);
-    set_property(*film, "width", static_cast<int64_t>(std::clamp(width, 1.0, static_cast<double>(kMostWidth))));
+    set_property(*film, "width", static_cast<int64_t>(std::clamp(width, 1.0, static_cast<double>(kMaxWidth))));
     set_property(*film, "height", kHeight);
     auto sampler = make_object("sampler", "independent", file_.where(), {{"sample_count", kSamples}});
     return make_object("sensor", type, file_.where(), {{"", ObjectPtr(film)}, {"", ObjectPtr(sampler)}});
@@ -190,8 +190,8 @@ class Reader {
   }
 
   void add(const ObjectPtr& object) {
-    if (scene_->properties.size() >= kMostObjects)
-      throw Error(ErrorCode::kInput, fmt::format("{}: more than {} objects", file_.where().text(), kMostObjects));
+    if (scene_->properties.size() >= kMaxObjects)
+      throw Error(ErrorCode::kInput, fmt::format("{}: more than {} objects", file_.where().text(), kMaxObjects));
     set_property(*scene_, "", object);
   }
 

@@ -60,7 +60,7 @@ Buffer<float> error_weights(Device& device, const Buffer<float>& guide, const Bu
 
 MixedBuffers mix(Device& device, const MixtureBuffers& in,
                  const std::function<std::vector<float>(const std::vector<NormalRow>&)>& everywhere) {
-  COVARY_CHECK(in.candidates >= 1 && in.candidates <= kMostCandidates, "between one and kMostCandidates candidates");
+  COVARY_CHECK(in.candidates >= 1 && in.candidates <= kMaxCandidates, "between one and kMaxCandidates candidates");
   const int columns = cells_in(in.width), rows = cells_in(in.height), m = in.candidates;
   const Buffer<float>& guide = *in.whole.candidates;
   const auto cells = device.make<float>(static_cast<size_t>(columns) * rows * (3 + n_normal_sums(m)));

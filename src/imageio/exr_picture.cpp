@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::array kPictures = {"combined", "ci", "c", "rgba", "rgb", "beauty", "default", "noisy image"};
 constexpr std::array kColours = {std::array{"r", "g", "b"}, std::array{"red", "green", "blue"}};
-constexpr size_t kMostListed = 20;  // channels of a part in a message
+constexpr size_t kMaxListed = 20;  // channels of a part in a message
 
 bool same(std::string_view a, std::string_view b) {
   return a.size() == b.size() && strncasecmp(a.data(), b.data(), a.size()) == 0;
@@ -75,9 +75,9 @@ std::vector<Candidate> find_luminances(std::span<const ExrPart> parts) {
 
 std::string listed(const ExrPart& part) {
   std::string text;
-  for (size_t i = 0; i < std::min(part.channels.size(), kMostListed); ++i)
+  for (size_t i = 0; i < std::min(part.channels.size(), kMaxListed); ++i)
     text += (i ? ", " : "") + part.channels[i].name;
-  return text + (part.channels.size() > kMostListed ? ", …" : "") + (part.deep ? ", deep" : "");
+  return text + (part.channels.size() > kMaxListed ? ", …" : "") + (part.deep ? ", deep" : "");
 }
 
 std::string listed(std::span<const ExrPart> parts) {

@@ -44,7 +44,7 @@ bool ends_in_medium(const Scene& scene, const PathRandom& random, Ray& ray, Auxi
   for (;;) {
     const bool found = scene.intersect(ray, hit);
     const float far = found ? hit.t : ray.t_max;
-    if (const float t = medium ? fly(*medium, ray, far, channel, numbers, weights, nullptr) : kInfinity;
+    if (const float t = medium ? sample_flight(*medium, ray, far, channel, numbers, weights, nullptr) : kInfinity;
         t < kInfinity) {
       values[2] = ray.at(t);
       const Medium::Coefficients here = medium->at(values[2]);

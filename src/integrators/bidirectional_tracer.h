@@ -203,7 +203,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
                     const SurfaceHit& hit, const State& state) const {
     const Emitter* emitter = emitter_met(path, hit, scene, scene.environment(), lengths_.hide_emitters);
     if (!emitter) return {};
-    const EnvironmentLight light = light_met(*emitter, path, ray, hit);
+    const EnvironmentLight light = emitted_light(*emitter, path, ray, hit);
     const Spectrum radiance = path.throughput * light.radiance;
     if (is_black(radiance)) return {};
     const SubpathSums& left = state.sums[path.sample];

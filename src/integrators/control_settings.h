@@ -36,7 +36,7 @@ struct ControlSettings {
   LightSelection lights = LightSelection::kPower;
   uint32_t grid = kAutomaticGrid;  ///< cells along the longest side of the scene
   uint32_t train_spp = 16;         ///< samples per pixel to learn from
-  uint32_t clusters = 256;         ///< maximum number of light clusters; see most_clusters()
+  uint32_t clusters = 256;         ///< maximum number of light clusters; see max_clusters()
   VarianceKind variance = VarianceKind::kRelative;
   bool albedo = true;  ///< see by_albedo()
   bool paper = false;  ///< as published, see solves_once() and CacheSettings::published()
@@ -49,7 +49,7 @@ struct ControlSettings {
   /// Whether anything is learnt: coefficients, or light selection.
   bool learns() const { return on() || lights == LightSelection::kLearned; }
   /// Maximum number of light clusters. In the program of [Hua2023], that of [Vevoda2018] has fewer.
-  uint32_t most_clusters() const {
+  uint32_t max_clusters() const {
     constexpr uint32_t kOfVevoda = 500;
     return paper && kind == ControlKind::kVevoda ? kOfVevoda : clusters;
   }
@@ -97,8 +97,7 @@ inline void declare(Settings& s, ControlSettings& v) {
       {"absolute", VarianceKind::kAbsolute}};
   s.group("Integrator controlled-path", OptionEffect::kSamples);
   if (s.preset("cv-paper")) v = ControlSettings::published();
-  s.choice("cv", v.kind, kControlKinds, "Coefficients: per channel, one, of NEE only, per pixel",
-           {.film = "cv={}"});
+  s.choice("cv", v.kind, kControlKinds, "Coefficients: per channel, one, of NEE only, per pixel", {.film = "cv={}"});
   s.choice("lights", v.lights, kSelections, "How lights are chosen: by triangle, shape, power, or as learnt",
            {.film = "lights={}"});
   s.flag("cv-paper", v.paper,

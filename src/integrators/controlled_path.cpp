@@ -35,7 +35,7 @@ void ControlledPath::prepare(const Scene& scene) {
                  settings_.lights == LightSelection::kLearned,
                  settings_.by_albedo(),
                  settings_.kind == ControlKind::kMono};
-  clusters_ = cluster_light_set(lights_, scene.bounds(), settings_.learns() ? settings_.most_clusters() : ~0u);
+  clusters_ = cluster_light_set(lights_, scene.bounds(), settings_.learns() ? settings_.max_clusters() : ~0u);
   controlled_.cluster_of = clusters_.cluster_of;
   if (settings_.learns())
     cache_ = CoefficientCache(scene.bounds(), expected_samples(clusters_, lights_), controlled_.n_dense(),

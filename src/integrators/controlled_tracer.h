@@ -73,7 +73,7 @@ class ControlledTracer {
     EnvironmentLight light;
     if (depth + 1 >= lengths_.min_depth)
       if (const Emitter* emitter = emitter_met(path, hit, scene_, control_.environment, lengths_.hide_emitters))
-        light = light_met(*emitter, path, batch_.rays[i], hit);
+        light = emitted_light(*emitter, path, batch_.rays[i], hit);
     ControlledVertex& vertex = batch_.vertices[path.sample];
     float r = 1;
     uint32_t cluster = kNoLight;
@@ -136,7 +136,7 @@ class ControlledTracer {
     }
     vertex.direction_weight = next.weight;
     scatter_path(path, next);
-    lead_on(path, batch_.rays[i], hit, next, hit.frame.to_world(next.wi));
+    continue_path(path, batch_.rays[i], hit, next, hit.frame.to_world(next.wi));
     return true;
   }
 
@@ -219,10 +219,10 @@ class ControlledTracer {
 
   /// The albedo of a surface; never zero, since a black surface can have highlights.
   Spectrum albedo_scale_of(const SurfaceHit& hit) const {
-    constexpr float kLeast = 0.02f;
+    constexpr float kMin = 0.02f;
     Spectrum albedo = hit.bsdf->albedo(hit);
     if (control_.monochrome) albedo = Spectrum(mean(albedo));
-    for (int c = 0; c < 3; ++c) albedo[c] = std::clamp(albedo[c], kLeast, 1.0f);
+    for (int c = 0; c < 3; ++c) albedo[c] = std::clamp(albedo[c], kMin, 1.0f);
     return albedo;
   }
 

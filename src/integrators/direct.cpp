@@ -12,7 +12,7 @@
 namespace covary {
 namespace {
 
-constexpr int kMostSamples = 1 << 16;
+constexpr int kMaxSamples = 1 << 16;
 
 struct DirectSettings {
   int shading_samples = 1, emitter_samples = 1, bsdf_samples = 1;
@@ -56,7 +56,7 @@ class DirectIntegrator final : public Integrator {
     const PathState& path = batch.paths[i];
     const SurfaceHit& hit = batch.hits[i];
     const Emitter* emitter = emitter_met(path, hit, scene, scene.environment(), lengths_.hide_emitters);
-    return emitter ? light_met(*emitter, path, batch.rays[i], hit).radiance : Spectrum();
+    return emitter ? emitted_light(*emitter, path, batch.rays[i], hit).radiance : Spectrum();
   }
 
   const BsdfClosure& bind(const SurfaceHit& hit, const Vec3& wo, PathContext& context) const {
@@ -143,12 +143,12 @@ std::shared_ptr<Integrator> make_direct(Settings& s, const PathLengthSettings& l
   static const OptionTraits kOfScene{.level = OptionLevel::kScene};
   DirectSettings v;
   s.group("Direct light", OptionEffect::kSamples);
-  s.whole("shading-samples", v.shading_samples, {.low = 1, .high = kMostSamples},
+  s.whole("shading-samples", v.shading_samples, {.low = 1, .high = kMaxSamples},
           "Light samples and BSDF samples per camera sample", kOfScene);
   v.emitter_samples = v.bsdf_samples = v.shading_samples;
-  s.whole("emitter-samples", v.emitter_samples, {.low = 0, .high = kMostSamples}, "Light samples, if different",
+  s.whole("emitter-samples", v.emitter_samples, {.low = 0, .high = kMaxSamples}, "Light samples, if different",
           kOfScene);
-  s.whole("bsdf-samples", v.bsdf_samples, {.low = 0, .high = kMostSamples}, "BSDF samples, if different", kOfScene);
+  s.whole("bsdf-samples", v.bsdf_samples, {.low = 0, .high = kMaxSamples}, "BSDF samples, if different", kOfScene);
   if (v.emitter_samples + v.bsdf_samples == 0)
     throw Error(ErrorCode::kInput, "emitter_samples and bsdf_samples are both 0; there must be a sample");
   return std::make_shared<DirectIntegrator>(v, lengths);

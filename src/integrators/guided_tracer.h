@@ -119,7 +119,7 @@ class GuidedTracer {
     scatter_path(path, next);
     path.bsdf_throughput *= next.weight * (direction.pdf_bsdf > 0 ? next.pdf / direction.pdf_bsdf : 1);
     const Vec3 wi = hit.frame.to_world(next.wi);
-    lead_on(path, batch_.rays[i], hit, next, wi);
+    continue_path(path, batch_.rays[i], hit, next, wi);
     if (batch_.recording && !next.is_delta() && guide_.guidable > 0) record(path, arriving, hit.p, wi, next.pdf);
     return true;
   }
@@ -138,13 +138,13 @@ class GuidedTracer {
   float worth(Path& path, float outgoing) const {
     const float value = max_component(path.throughput) * outgoing;
     if (path.first_value == 0) path.first_value = value;
-    const float ratio = kWorthRatio * value / path.first_value;
+    const float ratio = kSurvivalRatio * value / path.first_value;
     // The root is that of roulette.h.
     return samples_[path.sample].random.sampling() == Sampling::kCrn ? std::sqrt(std::sqrt(ratio)) : ratio;
   }
 
   bool survives(int depth, Path& path, float survival) {
-    survival = std::max(survival, kLeastSurvival);
+    survival = std::max(survival, kMinSurvival);
     if (depth >= lengths_.rr_depth) survival = std::min(survival, 0.95f);  // every path ends
     if (survival >= 1) return true;
     if (!(samples_[path.sample].random.get_1d(path.last_vertex, Event::kRoulette) < survival)) return false;
@@ -160,7 +160,7 @@ class GuidedTracer {
     if (depth + 1 < lengths_.min_depth) return;
     const Emitter* emitter = emitter_met(path, hit, scene_, guided_.environment, lengths_.hide_emitters);
     if (!emitter) return;
-    const EnvironmentLight light = light_met(*emitter, path, batch_.rays[i], hit);
+    const EnvironmentLight light = emitted_light(*emitter, path, batch_.rays[i], hit);
     if (is_black(light.radiance)) return;
     const Spectrum radiance = path.throughput * light.radiance;
     if (path.previous_delta || !guided_.lights) {
@@ -288,9 +288,9 @@ class GuidedTracer {
       }
   }
 
-  /// Before `rr_depth`, roulette ends no path that is expected to bring more than 1 / kWorthRatio of what it was at its
-  /// first vertex, so that few survivors get large weights (docs/notes/guiding.md).
-  static constexpr float kWorthRatio = 8, kLeastSurvival = 0.1f;
+  /// Before `rr_depth`, roulette ends no path that is expected to bring more than 1 / kSurvivalRatio of what it was at
+  /// its first vertex, so that few survivors get large weights (docs/notes/guiding.md).
+  static constexpr float kSurvivalRatio = 8, kMinSurvival = 0.1f;
   static constexpr TechniqueDensities kNoWeights{};
   const Scene& scene_;
   const GuidedScene& guided_;

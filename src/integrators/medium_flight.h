@@ -73,8 +73,8 @@ inline Spectrum emission_along(const Medium& medium, const Ray& ray, float lengt
 /// Flies along `ray` up to `far`, sampling for `channel`. Returns the distance at which light scatters; infinity if it
 /// passes through, or `stop` became true. Unless it is null, an estimate of the light that the medium emits on the way
 /// is added to `glow`: exact if the medium is homogeneous, otherwise from all collisions [Novak2018].
-inline float fly(const Medium& medium, const Ray& ray, float far, int channel, FlightNumbers& numbers,
-                 SpectralWeights& weights, const std::atomic<bool>* stop, Spectrum* glow = nullptr) {
+inline float sample_flight(const Medium& medium, const Ray& ray, float far, int channel, FlightNumbers& numbers,
+                           SpectralWeights& weights, const std::atomic<bool>* stop, Spectrum* glow = nullptr) {
   float t = 0;
   if (!medium.clip(ray, t, far)) return kInfinity;
   const Spectrum& majorant = medium.majorant();
@@ -117,9 +117,9 @@ inline float fly(const Medium& medium, const Ray& ray, float far, int channel, F
 }
 
 /// Estimates the transmittance from 0 to `far`; exact if the extinction is constant. Here `pdf_path` is the density of
-/// fly(), `pdf_light` that of this function.
-inline void come_through(const Medium& medium, const Ray& ray, float far, int channel, FlightNumbers& numbers,
-                         SpectralWeights& weights, const std::atomic<bool>* stop) {
+/// sample_flight(), `pdf_light` that of this function.
+inline void attenuate(const Medium& medium, const Ray& ray, float far, int channel, FlightNumbers& numbers,
+                      SpectralWeights& weights, const std::atomic<bool>* stop) {
   float t = 0;
   if (!medium.clip(ray, t, far)) return;
   const Spectrum& majorant = medium.majorant();

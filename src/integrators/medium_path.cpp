@@ -42,7 +42,8 @@ bool MediumPath::advance() {
     const float far = found ? hit.t : ray_.t_max;
     Spectrum glow;
     const bool glows = medium_->emits() && depth_ + 1 >= lengths_.min_depth;
-    const float t = fly(*medium_, ray_, far, channel_, numbers_, weights_, context_.stop, glows ? &glow : nullptr);
+    const float t =
+        sample_flight(*medium_, ray_, far, channel_, numbers_, weights_, context_.stop, glows ? &glow : nullptr);
     if (glows) add_glow(glow);
     if (t < kInfinity) return scatter_in_medium(ray_.at(t));
   }
@@ -188,7 +189,7 @@ bool MediumPath::light_arrives(Ray ray, const EmitterSample& light, const Medium
     ++context_.n_rays;
     const bool found = scene_.intersect(ray, hit);
     if (found && !(hit.bsdf_flags & kNullTransmission)) return false;
-    if (medium) come_through(*medium, ray, found ? hit.t : ray.t_max, channel_, numbers, weights, context_.stop);
+    if (medium) attenuate(*medium, ray, found ? hit.t : ray.t_max, channel_, numbers, weights, context_.stop);
     if (!found || is_black(weights.throughput)) return !is_black(weights.throughput);
     const NullPassage passage = null_passage(hit, ray.d);
     weights.throughput *= passage.transmittance, weights.pdf_path *= passage.pmf;

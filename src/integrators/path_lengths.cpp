@@ -4,14 +4,14 @@
 namespace covary {
 
 void declare(Settings& s, PathLengthSettings& v) {
-  constexpr int kMost = 1 << 30;
+  constexpr int kMax = 1 << 30;
   static const OptionTraits kOfScene{.level = OptionLevel::kScene};
   int max_depth = v.max_depth == PathLengthSettings::kUnlimited ? -1 : v.max_depth;
   s.group("Paths", OptionEffect::kSamples);
-  s.whole("max-depth", max_depth, {.low = -1, .high = kMost},
+  s.whole("max-depth", max_depth, {.low = -1, .high = kMax},
           "Maximum path edges: 1 is visible emission, 2 direct light; -1: no limit", {.level = OptionLevel::kBasic});
-  s.whole("min-depth", v.min_depth, {.low = 0, .high = kMost}, "Leave out paths with fewer edges than this", kOfScene);
-  s.whole("rr-depth", v.rr_depth, {.low = 1, .high = kMost}, "Edges after which Russian roulette may end a path",
+  s.whole("min-depth", v.min_depth, {.low = 0, .high = kMax}, "Leave out paths with fewer edges than this", kOfScene);
+  s.whole("rr-depth", v.rr_depth, {.low = 1, .high = kMax}, "Edges after which Russian roulette may end a path",
           kOfScene);
   s.on_off("hide-emitters", v.hide_emitters, "Show lights that the camera sees directly as black", kOfScene);
   v.max_depth = max_depth < 0 ? PathLengthSettings::kUnlimited : max_depth;

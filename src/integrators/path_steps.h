@@ -34,14 +34,14 @@ void skip_area_lights(const Scene& scene, Path& path, Ray& ray, SurfaceHit& hit,
   }
 }
 
-/// Marks a hit that was set apart.
-inline void leave_apart(SurfaceHit& hit) { hit.bsdf = nullptr, hit.bsdf_flags = 0, hit.emitter = nullptr; }
+/// Marks a hit whose shading is deferred.
+inline void mark_deferred(SurfaceHit& hit) { hit.bsdf = nullptr, hit.bsdf_flags = 0, hit.emitter = nullptr; }
 
-/// Nearest hits of all rays; `depth`: edges before them. Hits for which `set_apart` is true are left unresolved and
+/// Nearest hits of all rays; `depth`: edges before them. Hits for which `deferred` is true are left unresolved and
 /// have no BSDF.
-template <typename Batch, typename SetApart>
+template <typename Batch, typename Deferred>
 void find_surfaces(const Scene& scene, int depth, bool hide_emitters, Batch& batch, PathContext& context,
-                   const SetApart& set_apart) {
+                   const Deferred& deferred) {
   const size_t n = batch.paths.size();
   // Camera rays are coherent, but traced as such their hits would depend on the others of the batch.
   scene.nearest(batch.rays, batch.ray_hits, false);
@@ -49,8 +49,8 @@ void find_surfaces(const Scene& scene, int depth, bool hide_emitters, Batch& bat
   for (size_t i = 0; i < n; ++i) {
     batch.paths[i].found = batch.ray_hits[i].found();
     if (!batch.paths[i].found) continue;
-    if (set_apart(i)) {
-      leave_apart(batch.hits[i]);
+    if (deferred(i)) {
+      mark_deferred(batch.hits[i]);
       continue;
     }
     scene.resolve(batch.rays[i], batch.ray_hits[i], batch.hits[i]);
@@ -77,7 +77,7 @@ void keep_paths(Batch& batch, const Keep& keep) {
       if (batch.hits[i].bsdf)
         batch.hits[n_kept] = batch.hits[i];
       else
-        leave_apart(batch.hits[n_kept]);
+        mark_deferred(batch.hits[n_kept]);
     }
     ++n_kept;
   }
@@ -99,7 +99,7 @@ inline void scatter_path(PathState& path, const BsdfSample& next) {
 }
 
 /// Continues a path from a surface in the sample's world direction `wi`.
-inline void lead_on(PathState& path, Ray& ray, const SurfaceHit& hit, const BsdfSample& next, const Vec3& wi) {
+inline void continue_path(PathState& path, Ray& ray, const SurfaceHit& hit, const BsdfSample& next, const Vec3& wi) {
   path.previous_p = hit.p;
   path.previous_pdf = next.pdf;
   path.previous_delta = next.is_delta();
@@ -151,8 +151,8 @@ inline const Emitter* emitter_met(const PathState& path, const SurfaceHit& hit, 
   return scene.background() ? scene.background() : hide_emitters ? nullptr : environment;
 }
 /// Its radiance along the ray; the density is that of the environment.
-inline EnvironmentLight light_met(const Emitter& emitter, const PathState& path, const Ray& ray,
-                                  const SurfaceHit& hit) {
+inline EnvironmentLight emitted_light(const Emitter& emitter, const PathState& path, const Ray& ray,
+                                      const SurfaceHit& hit) {
   return path.found ? EnvironmentLight{emitter.surface_radiance(hit, -ray.d)} : emitter.environment(ray.d);
 }
 
@@ -178,8 +178,8 @@ void follow_paths(const Scene& scene, const PathLengthSettings& lengths, std::sp
                   PathContext& context, Steps&& steps) {
   for (int depth = 0; !batch.paths.empty(); ++depth) {
     find_surfaces(scene, depth, lengths.hide_emitters, batch, context, [&](size_t i) {
-      if constexpr (requires { steps.finish_apart(depth); })
-        return steps.sets_apart(batch.rays[i], batch.ray_hits[i]);
+      if constexpr (requires { steps.finish_deferred(depth); })
+        return steps.defers(batch.rays[i], batch.ray_hits[i]);
       else
         return false;
     });
@@ -190,9 +190,9 @@ void follow_paths(const Scene& scene, const PathLengthSettings& lengths, std::sp
     batch.goes_on.assign(batch.paths.size(), false);
     for (uint32_t i = 0; i < batch.paths.size(); ++i) {
       const SurfaceHit& hit = batch.hits[i];
-      if constexpr (requires { steps.finish_apart(depth); })
+      if constexpr (requires { steps.finish_deferred(depth); })
         if (!hit.bsdf) {
-          steps.scatter_apart(depth, i);
+          steps.scatter_deferred(depth, i);
           continue;
         }
       const Vec3 wo = hit.frame.to_local(-batch.rays[i].d);
@@ -201,7 +201,7 @@ void follow_paths(const Scene& scene, const PathLengthSettings& lengths, std::sp
       const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
       batch.goes_on[i] = steps.scatter(depth, i, PathVertex{hit, *bsdf, wo, address, samples[batch.paths[i].sample]});
     }
-    if constexpr (requires { steps.finish_apart(depth); }) steps.finish_apart(depth);
+    if constexpr (requires { steps.finish_deferred(depth); }) steps.finish_deferred(depth);
     batch.alive.clear();
     for (uint32_t i = 0; i < batch.paths.size(); ++i)
       if (batch.goes_on[i]) batch.alive.push_back(i);

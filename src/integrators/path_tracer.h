@@ -128,25 +128,23 @@ class PathTracer final : public Integrator {
         if (!(weight > 0)) return false;
         path.throughput *= weight;
       }
-      lead_on(path, batch.rays[i], vertex.hit, next, vertex.hit.frame.to_world(next.wi));
+      continue_path(path, batch.rays[i], vertex.hit, next, vertex.hit.frame.to_world(next.wi));
       return true;
     }
 
     /// Lambertian mesh vertices, which are shaded in blocks.
-    bool sets_apart(const Ray& ray, const RayHit& hit) {
-      return Parts::kInBlocks && batch.meshes.find(scene, ray, hit);
-    }
+    bool defers(const Ray& ray, const RayHit& hit) { return Parts::kInBlocks && batch.meshes.find(scene, ray, hit); }
 
-    void scatter_apart(int depth, uint32_t i) {
+    void scatter_deferred(int depth, uint32_t i) {
       LambertianBlock& block = batch.block;
       Path& path = batch.paths[i];
       block.add(i, path.throughput, path.eta, batch.rays[i], batch.ray_hits[i], batch.meshes.at(batch.ray_hits[i]),
                 samples[path.sample].random, kFirstSurfaceVertex + path.n_smooth++);
-      if (block.full()) finish_apart(depth);
+      if (block.full()) finish_deferred(depth);
     }
 
     /// Connects and scatters the vertices of the block.
-    void finish_apart(int depth) {
+    void finish_deferred(int depth) {
       LambertianBlock& block = batch.block;
       if (block.size() == 0) return;
       block.find_surfaces();
@@ -202,7 +200,7 @@ class PathTracer final : public Integrator {
     Spectrum emission(const Path& path, const Ray& ray, const SurfaceHit& hit) const {
       const Emitter* emitter = emitter_met(path, hit, scene, scene.environment(), tracer.lengths_.hide_emitters);
       if (!emitter) return {};
-      const EnvironmentLight light = light_met(*emitter, path, ray, hit);
+      const EnvironmentLight light = emitted_light(*emitter, path, ray, hit);
       const Spectrum radiance = path.throughput * light.radiance;
       if (path.previous_delta || is_black(radiance)) return radiance;
       const float pdf_light = path.found ? emitter->pdf_solid_angle(path.previous_p, hit) : light.pdf_solid_angle;

@@ -108,10 +108,10 @@ class SceneWriter : public ::testing::Test {
     return all;
   }
 
-  void expect_same(const std::string& from, const std::string& to, size_t least_objects) {
+  void expect_same(const std::string& from, const std::string& to, size_t min_objects) {
     const auto folder = [](const std::string& path) { return std::filesystem::path(path).parent_path().string(); };
     const std::vector<std::string> a = objects_of(*read(from), folder(from)), b = objects_of(*read(to), folder(to));
-    ASSERT_GE(a.size(), least_objects);
+    ASSERT_GE(a.size(), min_objects);
     ASSERT_EQ(a.size(), b.size());
     for (size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i], b[i]) << i;
   }

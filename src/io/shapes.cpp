@@ -245,7 +245,7 @@ namespace {
 class Reader {
  public:
   Reader(CurveKind kind, const Transform& to_world)
-      : n_least_(kind == CurveKind::kLinear ? 2 : 4), to_world_(to_world) {}
+      : min_points_(kind == CurveKind::kLinear ? 2 : 4), to_world_(to_world) {}
 
   void read(std::string_view text) {
     while (!text.empty()) {
@@ -276,15 +276,15 @@ class Reader {
   void end_curve() {
     const size_t n = points.size() - first_;
     if (n == 0) return;
-    if (n < n_least_)
+    if (n < min_points_)
       throw Error(ErrorCode::kInput, fmt::format("line {}: the curve before it has {} control points; at least {} are "
                                                  "needed",
-                                                 line_, n, n_least_));
-    for (size_t i = first_; i + n_least_ <= points.size(); ++i) segments.push_back(static_cast<uint32_t>(i));
+                                                 line_, n, min_points_));
+    for (size_t i = first_; i + min_points_ <= points.size(); ++i) segments.push_back(static_cast<uint32_t>(i));
     first_ = points.size();
   }
 
-  size_t n_least_, first_ = 0, line_ = 0;
+  size_t min_points_, first_ = 0, line_ = 0;
   Transform to_world_;
 };
 

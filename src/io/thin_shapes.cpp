@@ -15,7 +15,7 @@ namespace covary {
 namespace {
 
 constexpr float kFarInDiameters = 32;
-constexpr size_t kMostShapes = 4096, kMostNamed = 3;
+constexpr size_t kMaxShapes = 4096, kMaxNamed = 3;
 constexpr uint32_t kPoints = 6;  // probed per shape
 
 struct SurfacePoint {
@@ -52,7 +52,7 @@ float thickness(const Scene& scene, const Shape& shape, const SurfacePoint& at, 
   Ray ray{at.p - w * (4 * step), w, most + 8 * step};
   SurfaceHit hit;
   float first = kInfinity;
-  for (int i = 0; i < 2 + static_cast<int>(kFewestSpacings) && scene.intersect(ray, hit); ++i) {
+  for (int i = 0; i < 2 + static_cast<int>(kMinSpacings) && scene.intersect(ray, hit); ++i) {
     const float along = dot(hit.p - at.p, w);
     if (first == kInfinity)
       first = along;
@@ -78,11 +78,11 @@ class Search {
       const std::optional<SurfacePoint> local = point_on(shape, i);
       if (!local) return;
       const SurfacePoint at{to_world.point(local->p), normalize(to_world.normal(local->n))};
-      const float spacing = spacing_at(at.p), most = kFewestSpacings * spacing;
+      const float spacing = spacing_at(at.p), most = kMinSpacings * spacing;
       const float found = std::min(thickness(scene_, shape, at, at.n, most), thickness(scene_, shape, at, -at.n, most));
       if (found < most) return warn(shape, fmt::format("{:.2g} thick", found), at.p, "light that passes it", most);
     }
-    const float most = kFewestAcross * spacing_at(bounds.center()), across = 2 * bounds.radius();
+    const float most = kMinAcross * spacing_at(bounds.center()), across = 2 * bounds.radius();
     if ((shape.bsdf_flags() & kTransmission) && across < most)
       warn(shape, fmt::format("{:.2g} across", across), bounds.center(),
            "light that passes it where it meets other surfaces", most);
@@ -90,7 +90,7 @@ class Search {
 
   void warn(const Shape& shape, const std::string& size, const Vec3& p, const char* what, float least) {
     named_.insert(&shape);
-    if (named_.size() <= kMostNamed)
+    if (named_.size() <= kMaxNamed)
       warnings_.push_back(
           fmt::format("{} is {} at ({:.7g}, {:.7g}, {:.7g}), where floats are {:.2g} apart: {} may be "
                       "wrong; expected at least {:.2g}, or a place nearer to the origin",
@@ -98,8 +98,8 @@ class Search {
   }
 
   void finish() {
-    if (named_.size() > kMostNamed)
-      warnings_.push_back(fmt::format("{} more shapes are as thin for where they stand", named_.size() - kMostNamed));
+    if (named_.size() > kMaxNamed)
+      warnings_.push_back(fmt::format("{} more shapes are as thin for where they stand", named_.size() - kMaxNamed));
   }
 
  private:
@@ -116,11 +116,11 @@ void warn_of_thin_shapes(const Scene& scene, const std::function<std::string(con
   Search search(scene, name_of, warnings);
   size_t n = 0;
   for (const ShapePtr& shape : scene.shapes())
-    if (n++ < kMostShapes) search.probe(*shape, Transform());
+    if (n++ < kMaxShapes) search.probe(*shape, Transform());
   std::set<const ShapeGroup*> groups;
   for (const Instance& instance : scene.instances())
     for (const ShapePtr& shape : instance.group->shapes) {
-      if (n++ < kMostShapes) search.probe(*shape, instance.to_world);
+      if (n++ < kMaxShapes) search.probe(*shape, instance.to_world);
       const auto* curve = dynamic_cast<const CurveShape*>(shape.get());
       if (curve && curve->kind() == CurveKind::kLinear && curve->shortest_segment() < kShortSegment / 8 &&
           groups.insert(instance.group.get()).second)

@@ -329,7 +329,7 @@ class Experiment {
       for (const Cell& cell : results_.cells)
         if (cell.scene == s && (!best || cell.split.relative.error.value < best->split.relative.error.value))
           best = &cell;
-      if (!best || best->split.reference_noise <= kMostReferenceNoise * std::abs(best->split.relative.error.value))
+      if (!best || best->split.reference_noise <= kMaxReferenceNoise * std::abs(best->split.relative.error.value))
         continue;
       results_.warnings.push_back(
           fmt::format("{}: the noise of the references makes the error of the best method, {:.2g}, uncertain by "

@@ -157,10 +157,10 @@ LocatedJson parse_located(const std::string& text, const std::string& name) {
 }
 
 std::string shown(const Json& value) {
-  constexpr size_t kMost = 60;
+  constexpr size_t kMax = 60;
   // ASCII only, so that truncation cannot split a character.
   std::string text = value.dump(-1, ' ', true, Json::error_handler_t::replace);
-  return text.size() > kMost ? text.substr(0, kMost - 3) + "..." : text;
+  return text.size() > kMax ? text.substr(0, kMax - 3) + "..." : text;
 }
 
 ObjectReader::ObjectReader(const LocatedJson& document, std::string pointer, std::vector<std::string>& problems)

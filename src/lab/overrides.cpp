@@ -105,7 +105,7 @@ void check_sizes(const Overrides& o) {
 
 }  // namespace
 
-int64_t most_pixels(const Overrides& o) {
+int64_t max_pixels(const Overrides& o) {
   const std::vector<int> size = whole_numbers(o.size, 'x');
   if (size.size() == 2) return static_cast<int64_t>(size[0]) * size[1];
   return o.quick ? o.quick->pixels : 0;

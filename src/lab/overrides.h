@@ -37,7 +37,7 @@ struct Overrides {
 };
 
 /// Maximum number of pixels of frames that the suite neither sizes nor crops; 0: no limit.
-int64_t most_pixels(const Overrides& overrides);
+int64_t max_pixels(const Overrides& overrides);
 
 /// Throws Error(kUsage) if a named scene or method is not in the suite, or for invalid sizes.
 void apply(const Overrides& overrides, Suite& suite);

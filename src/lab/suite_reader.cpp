@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr int64_t kLargestInt = std::numeric_limits<int>::max();
 constexpr int64_t kLargestSpp = 1 << 30;  // as for `covary render --spp`
-constexpr size_t kMostSeeds = 100000;     // as for `covary experiment --seeds`
+constexpr size_t kMaxSeeds = 100000;      // as for `covary experiment --seeds`
 
 class SuiteReader {
  public:
@@ -141,15 +141,15 @@ class SuiteReader {
     if (!value) return {1};
     if (value->is_number_unsigned()) {
       const uint64_t n = value->get<uint64_t>();
-      if (n < 1 || n > kMostSeeds)
-        top.problem("seeds", fmt::format("expected 1 to {} seeds, found {}", kMostSeeds, n));
+      if (n < 1 || n > kMaxSeeds)
+        top.problem("seeds", fmt::format("expected 1 to {} seeds, found {}", kMaxSeeds, n));
       else
         for (uint64_t s = 1; s <= n; ++s) result.push_back(s);
-    } else if (value->is_array() && value->size() <= kMostSeeds &&
+    } else if (value->is_array() && value->size() <= kMaxSeeds &&
                std::all_of(value->begin(), value->end(), [](const Json& s) { return s.is_number_unsigned(); })) {
       result = value->get<std::vector<uint64_t>>();
     } else {
-      top.problem("seeds", fmt::format("expected a number of seeds or a list of at most {} seeds, found {}", kMostSeeds,
+      top.problem("seeds", fmt::format("expected a number of seeds or a list of at most {} seeds, found {}", kMaxSeeds,
                                        shown(*value)));
     }
     return result;

@@ -13,8 +13,8 @@
 namespace covary {
 namespace {
 
-constexpr double kSeconds = 0.25;       // for the samples, at most
-constexpr double kFewestPixels = 4000;  // of the picture that measures the speed
+constexpr double kSeconds = 0.25;    // for the samples, at most
+constexpr double kMinPixels = 4000;  // of the picture that measures the speed
 constexpr uint64_t kOtherSeed = 0x6c697665;
 
 /// The render's integrator, or path tracing in place of one that has to be chosen or trained first.
@@ -61,8 +61,8 @@ FirstPicture first_picture_of(const LoadedScene& scene, const Plan& plan, const 
   const std::shared_ptr<Integrator> integrator = prepared_integrator(scene, plan, first);
   const CropWindow window = window_of(scene, request);
   const double area = static_cast<double>(window.width) * window.height;
-  FirstPicture picture{{}, kMostStride};
-  while (picture.stride > 1 && area / (picture.stride * picture.stride) < kFewestPixels) picture.stride /= 2;
+  FirstPicture picture{{}, kMaxStride};
+  while (picture.stride > 1 && area / (picture.stride * picture.stride) < kMinPixels) picture.stride /= 2;
   const Stopwatch watch;
   picture.image = one_sample_image(scene, *integrator, first, picture.stride, stop);
   const double per_pixel = watch.seconds() / (area / (picture.stride * picture.stride));

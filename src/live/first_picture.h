@@ -10,7 +10,7 @@
 namespace covary {
 
 /// Largest side of the squares, in pixels, of which pictures made in a hurry have one value each.
-inline constexpr int kMostStride = 16;
+inline constexpr int kMaxStride = 16;
 
 struct FirstPicture {
   Image image;     ///< of the centres of the squares

@@ -65,7 +65,7 @@ std::vector<fs::path> LiveFiles::files() const {
   }
   std::sort(paths.begin(), paths.end(),
             [](const fs::path& a, const fs::path& b) { return std::pair(time_of(a), b) > std::pair(time_of(b), a); });
-  paths.resize(std::min(paths.size(), kMost));
+  paths.resize(std::min(paths.size(), kMax));
   std::sort(paths.begin(), paths.end());
   return paths;
 }
@@ -152,7 +152,7 @@ void LiveFiles::show() {
   });
   Json pictures = Json::array();
   problems_.clear();
-  for (size_t i = 0; i < kMost; ++i)
+  for (size_t i = 0; i < kMax; ++i)
     page_.remove(fmt::format("file{}", i)), page_.remove(fmt::format("file{}:error", i));
   page_.remove("all"), page_.remove("all:error");
   if (newest == followed_.end()) return page_.say({{"pictures", pictures}});

@@ -17,7 +17,7 @@ namespace covary {
 
 class LiveFiles {
  public:
-  static constexpr size_t kMost = 9;  ///< files that are shown, the newest
+  static constexpr size_t kMax = 9;  ///< files that are shown, the newest
 
   /// `path`: a file, followed together with the folder of films beside it ("out.passes" of "out.exr"), or a folder,
   /// whose EXR files are followed. Neither needs to exist yet. Throws Error(kIo) if no page can be served.

@@ -15,7 +15,7 @@ namespace covary {
 namespace {
 
 constexpr double kPresent = 3;  // seconds for which a reader counts as watching
-constexpr size_t kMostReaders = 100;
+constexpr size_t kMaxReaders = 100;
 
 using Json = nlohmann::json;
 
@@ -94,7 +94,7 @@ void LivePage::wait_until_seen(double seconds) const {
 LiveAnswer LivePage::state(const std::string& body) {
   const Json asked = Json::parse(body);
   const std::lock_guard lock(mutex_);
-  if (readers_.size() > kMostReaders) readers_.clear();
+  if (readers_.size() > kMaxReaders) readers_.clear();
   Reader& reader = readers_[asked.at("reader").get<std::string>()];
   reader = {watch_.seconds(), asked.at("has").get<int64_t>()};
   Json state = members_;

@@ -196,10 +196,10 @@ void LiveRender::show_denoised(std::span<const Pass> passes) {
   int groups = std::min(first.groups(), last.groups());
   for (const Film* film : {&first, &last})
     for (const uint32_t count : film->counts()) groups = std::min<int>(groups, static_cast<int>(count));
-  if (!whole && (groups < plan.method->fewest_groups || groups < 1)) return;
+  if (!whole && (groups < plan.method->min_groups || groups < 1)) return;
   const double area = static_cast<double>(first.width()) * first.height() * denoised_pixel_cost_;
   int stride = 1;
-  while (!whole && stride < kMostStride && !may_spend(area / (stride * stride))) stride *= 2;
+  while (!whole && stride < kMaxStride && !may_spend(area / (stride * stride))) stride *= 2;
   if (!may_spend(area / (stride * stride))) return;
   const Stopwatch watch;
   const auto taken = [&](const Film& film) {

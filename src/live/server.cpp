@@ -25,7 +25,7 @@ namespace http = beast::http;
 using asio::ip::tcp;
 
 constexpr auto kPatience = std::chrono::seconds(30);  // with a reader who neither asks nor takes
-constexpr size_t kMostBody = 64 << 10, kMostHeader = 16 << 10, kMostConnections = 64;
+constexpr size_t kMaxBody = 64 << 10, kMaxHeader = 16 << 10, kMaxConnections = 64;
 
 using Request = http::request<http::string_body>;
 using Response = http::response<http::span_body<const char>>;
@@ -70,8 +70,8 @@ class Session : public std::enable_shared_from_this<Session> {
 
   void read() {
     parser_.emplace();
-    parser_->body_limit(kMostBody);
-    parser_->header_limit(kMostHeader);
+    parser_->body_limit(kMaxBody);
+    parser_->header_limit(kMaxHeader);
     stream_.expires_after(kPatience);
     http::async_read(stream_, buffer_, *parser_, [self = shared_from_this()](beast::error_code failed, size_t) {
       if (!failed) self->write(self->parser_->release());
@@ -139,7 +139,7 @@ struct LiveServer::Implementation {
   void accept() {
     acceptor.async_accept([this](beast::error_code failed, tcp::socket socket) {
       if (!acceptor.is_open()) return;
-      if (!failed && connections < kMostConnections)
+      if (!failed && connections < kMaxConnections)
         std::make_shared<Session>(std::move(socket), token, answer, connections)->read();
       accept();
     });

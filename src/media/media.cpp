@@ -46,7 +46,7 @@ class ConstantVolume final : public Volume {
 
 /// Upper bound on collisions along a ray in a heterogeneous medium: beyond it, tracking would take too long, or steps
 /// would vanish in rounding.
-constexpr float kMostCollisions = 1e6f;
+constexpr float kMaxCollisions = 1e6f;
 
 bool not_negative(const Spectrum& s) { return is_finite(s) && s.r >= 0 && s.g >= 0 && s.b >= 0; }
 
@@ -110,10 +110,10 @@ std::shared_ptr<Medium> make_medium(Parameters& p, bool homogeneous) {
   const Bounds3 box = settings.extinction->bounds();
   const float collisions =
       max_component(settings.extinction->largest() * settings.scale) * length(box.upper - box.lower);
-  if (!homogeneous && !(collisions <= kMostCollisions))
+  if (!homogeneous && !(collisions <= kMaxCollisions))
     p.error_at("sigma_t", fmt::format("makes a ray collide {:.3g} times on the way through the box; at most {:.0f} are "
                                       "accepted (is 'scale' right?)",
-                                      collisions, kMostCollisions));
+                                      collisions, kMaxCollisions));
   settings.phase = phases.empty() ? isotropic_phase() : phases[0];
   return std::make_shared<Medium>(std::move(settings));
 }

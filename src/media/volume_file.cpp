@@ -20,7 +20,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "files are read as they lie in memory");
 
 constexpr size_t kHeaderBytes = 48;
-constexpr int kMostCells = 1 << 20;  // along one axis
+constexpr int kMaxCells = 1 << 20;  // along one axis
 
 template <typename T>
 T at(const char* header, size_t place) {
@@ -41,8 +41,8 @@ VolumeFile parse_header(const std::string& path, const char* header, size_t n_by
   VolumeFile file;
   for (size_t axis = 0; axis < 3; ++axis) {
     file.size[axis] = at<int32_t>(header, 8 + 4 * axis);
-    if (file.size[axis] < 1 || file.size[axis] > kMostCells)
-      throw refuse(fmt::format("has {} cells along {}; expected 1 to {}", file.size[axis], "xyz"[axis], kMostCells));
+    if (file.size[axis] < 1 || file.size[axis] > kMaxCells)
+      throw refuse(fmt::format("has {} cells along {}; expected 1 to {}", file.size[axis], "xyz"[axis], kMaxCells));
   }
   file.channels = at<int32_t>(header, 20);
   if (file.channels != 1 && file.channels != 3)

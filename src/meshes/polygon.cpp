@@ -147,9 +147,9 @@ void add_polygon(std::span<const uint32_t> corners, std::span<const Vec3> positi
     for (size_t i = 2; i < corners.size(); ++i) triangles.push_back({corners[0], corners[i - 1], corners[i]});
     return;
   }
-  if (points.size() > kMostConcaveCorners)
+  if (points.size() > kMaxConcaveCorners)
     throw Error(ErrorCode::kInput, fmt::format("a concave polygon has {} corners; at most {} are supported",
-                                               points.size(), kMostConcaveCorners));
+                                               points.size(), kMaxConcaveCorners));
   EarClipper(points).run([&](uint32_t i, uint32_t j, uint32_t k) {
     triangles.push_back({corners[i], corners[j], corners[k]});
   });

@@ -135,7 +135,7 @@ TEST(Polygon, OthersEnd) {
   add_polygon(std::array<uint32_t, 4>{0, 1, 2, 9}, points, triangles);
   EXPECT_EQ(triangles, (Triangles{{0, 1, 2}, {0, 2, 9}}));  // check_mesh() refuses it
   std::vector<Vec3> huge = {{0, -9, 0}};
-  for (size_t i = 0; i < kMostConcaveCorners; ++i) huge.push_back({static_cast<float>(i), i % 2 ? 1.0f : 0.0f, 0});
+  for (size_t i = 0; i < kMaxConcaveCorners; ++i) huge.push_back({static_cast<float>(i), i % 2 ? 1.0f : 0.0f, 0});
   try {
     triangles_of(huge);
     FAIL() << "accepted";

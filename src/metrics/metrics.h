@@ -30,7 +30,7 @@ inline constexpr double kPerceptible = 0.05;
 inline constexpr double kTrimmedPart = 0.001;
 
 /// Standard error by the references' noise, as a fraction of an error, above which references need more samples.
-inline constexpr double kMostReferenceNoise = 0.1;
+inline constexpr double kMaxReferenceNoise = 0.1;
 
 enum class Metric { kRelMse, kRelMseTrimmed, kMse, kMae, kMape, kFlip, kAbove5 };
 

@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using Words = std::vector<std::string>;
 
-constexpr int64_t kMost = 1'000'000'000;
+constexpr int64_t kMax = 1'000'000'000;
 
 // ---- reading
 
@@ -25,7 +25,7 @@ constexpr int64_t kMost = 1'000'000'000;
 QuickLimits quick_limits(const LocatedJson& document, const std::string& pointer, QuickLimits limits, Words& problems) {
   ObjectReader reader(document, pointer, problems);
   const auto whole = [&](const char* name, auto& value) {
-    if (const auto found = reader.whole(name, 1, kMost)) value = static_cast<std::decay_t<decltype(value)>>(*found);
+    if (const auto found = reader.whole(name, 1, kMax)) value = static_cast<std::decay_t<decltype(value)>>(*found);
   };
   whole("seeds", limits.seeds), whole("spp", limits.spp), whole("reference_spp", limits.reference_spp);
   whole("pixels", limits.pixels), whole("crop_pixels", limits.crop_pixels), whole("sized_pixels", limits.sized_pixels);

@@ -57,7 +57,7 @@ void PaperReport::add(const PreparedPart& part, const Results& results, Json doc
   if (const auto notes = notes_of(part); !notes.empty())
     head["blocks"].push_back({{"type", "notes"}, {"kind", "warning"}, {"items", notes}});
   const size_t n_values = values_of(pictures);
-  const bool with_pictures = picture_values_ + n_values <= kMostPictureValues;
+  const bool with_pictures = picture_values_ + n_values <= kMaxPictureValues;
   if (!with_pictures) head["text"].push_back(fmt::format("Pictures: on the page of this part, `{}/report.html`.", id));
   sections_.push_back(std::move(head));
   for (Json& section : document["sections"]) {

@@ -14,7 +14,7 @@ namespace covary::lab {
 
 /// What pages of several parts may hold, in values of images: 1.3 GB of HTML at most. Pictures beyond it are only on
 /// the parts' own pages.
-inline constexpr size_t kMostPictureValues = 250'000'000;
+inline constexpr size_t kMaxPictureValues = 250'000'000;
 
 /// Results of parts, joined as they are made.
 class PaperReport {

@@ -110,7 +110,7 @@ std::vector<Image> path_length_images(const Scene& scene, const Integrator& inte
                                       const Film& film) {
   if (!integrator.longest_path())
     throw Error(ErrorCode::kUsage, "the integrator has no images for each path length; controlled-path has");
-  const auto n = static_cast<size_t>(std::clamp(*integrator.longest_path(), 0, kMostEdges));
+  const auto n = static_cast<size_t>(std::clamp(*integrator.longest_path(), 0, kMaxEdges));
   std::vector<Film> parts = films_of_parts(film, n, 1);
   trace_parts(scene, integrator, settings, film, parts);
   std::vector<Image> images;

@@ -44,10 +44,10 @@ Film indirect_light(const Film& film, const Film& direct);
 // The image by path length in edges: directly visible lights (1), one reflection (2), …
 
 /// Longest path length that gets an image; longer paths are excluded.
-inline constexpr int kMostEdges = 16;
+inline constexpr int kMaxEdges = 16;
 
 /// Image i contains the part of the film's samples with paths of i + 1 edges; there is one image per length, at most
-/// kMostEdges. They sum to the film's mean if no path is longer. Traces the samples again, which takes as long as
+/// kMaxEdges. They sum to the film's mean if no path is longer. Traces the samples again, which takes as long as
 /// rendering the film did. `settings`: those of the film's render; returns none once stop is true. Throws Error(kUsage)
 /// for an integrator without Integrator::longest_path().
 std::vector<Image> path_length_images(const Scene& scene, const Integrator& integrator, const PassSettings& settings,

@@ -10,8 +10,8 @@
 namespace covary {
 namespace {
 
-constexpr double kTrimmed = 0.001;         // fraction of largest squares ignored: a few bright samples say little
-constexpr size_t kFewestValues = 3 * 128;  // with fewer, waves are weighted by their samples
+constexpr double kTrimmed = 0.001;      // fraction of largest squares ignored: a few bright samples say little
+constexpr size_t kMinValues = 3 * 128;  // with fewer, waves are weighted by their samples
 
 size_t colour_of(const Film& film, size_t pixel) {
   const auto width = static_cast<size_t>(film.width());
@@ -21,7 +21,7 @@ size_t colour_of(const Film& film, size_t pixel) {
 /// Mean without the largest values; 1 if there are too few values, or all are zero.
 double trimmed_mean(std::vector<float>& values) {
   const size_t n = values.size() - static_cast<size_t>(kTrimmed * static_cast<double>(values.size()));
-  if (values.size() < kFewestValues) return 1;
+  if (values.size() < kMinValues) return 1;
   std::nth_element(values.begin(), values.begin() + static_cast<ptrdiff_t>(n - 1), values.end());
   double sum = 0;
   for (size_t i = 0; i < n; ++i) sum += values[i];

@@ -25,7 +25,7 @@ PbrtDefinitionPtr PbrtNames::find(PbrtKind kind, const std::string& name, size_t
 ObjectPtr PbrtNames::make(PbrtDefinition& definition) {
   if (definition.state == PbrtDefinition::kMade) return definition.object;
   PbrtParameters& p = definition.parameters;
-  if (definition.state == PbrtDefinition::kBeingMade || depth_ >= kMostNesting) {
+  if (definition.state == PbrtDefinition::kBeingMade || depth_ >= kMaxNesting) {
     p.error(definition.state == PbrtDefinition::kBeingMade ? "refers to itself" : "refers to too many others in a row");
     return nullptr;
   }

@@ -33,7 +33,7 @@ using PbrtDefinitionPtr = std::shared_ptr<PbrtDefinition>;
 class PbrtNames {
  public:
   PbrtNames(FileResolver& files, PbrtMessages& messages, Diagnostics& diagnostics)
-      : files_(files), messages_(messages), limit_(kMostNesting, diagnostics) {}
+      : files_(files), messages_(messages), limit_(kMaxNesting, diagnostics) {}
 
   void define(PbrtKind kind, const std::string& name, const std::string& type, PbrtParameters parameters,
               const Transform& to_world);
@@ -56,7 +56,7 @@ class PbrtNames {
   std::map<ObjectPtr, ObjectPtr> reflectances;
 
  private:
-  static constexpr size_t kMostNesting = 64;
+  static constexpr size_t kMaxNesting = 64;
 
   FileResolver& files_;
   PbrtMessages& messages_;

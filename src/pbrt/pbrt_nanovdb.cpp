@@ -28,7 +28,7 @@ bool has_nanovdb() { return true; }
 
 namespace {
 
-constexpr double kMostCells = 1e8;
+constexpr double kMaxCells = 1e8;
 
 Error refusal(const std::string& path, const std::string& what) { return {ErrorCode::kInput, path + ": " + what}; }
 
@@ -45,7 +45,7 @@ DenseGrid layout_of(const nanovdb::FloatGrid& grid, const std::string& path) {
   if (!(std::min({n_voxels[0], n_voxels[1], n_voxels[2]}) >= 1)) throw refusal(path, "holds an empty grid");
   DenseGrid result;
   const auto cells = [&](int axis) { return std::ceil(n_voxels[axis] / result.step); };
-  while (cells(0) * cells(1) * cells(2) > kMostCells) ++result.step;
+  while (cells(0) * cells(1) * cells(2) > kMaxCells) ++result.step;
   require_memory(path, "its grid", 12 * cells(0) * cells(1) * cells(2));
   Matrix4 m{};
   const nanovdb::Vec3d origin(low[0] - 0.5, low[1] - 0.5, low[2] - 0.5);

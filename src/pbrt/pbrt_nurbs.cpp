@@ -12,7 +12,7 @@ namespace covary {
 namespace {
 
 constexpr size_t kSteps = 48;  // along each parameter; pbrt has 29
-constexpr int64_t kMostPoints = 1 << 16, kMostOrder = 32;
+constexpr int64_t kMaxPoints = 1 << 16, kMaxOrder = 32;
 
 /// B-splines of one parameter.
 struct Basis {
@@ -55,7 +55,7 @@ std::optional<Basis> read_basis(PbrtParameters& p, char letter) {
   basis.n = p.get_integer(std::string("n") + letter, -1);
   basis.order = p.get_integer(name("order"), -1);
   basis.knots = p.get_array(name("knots"), "float", 1);
-  if (basis.n < 1 || basis.n > kMostPoints || basis.order < 2 || basis.order > kMostOrder || basis.order > basis.n ||
+  if (basis.n < 1 || basis.n > kMaxPoints || basis.order < 2 || basis.order > kMaxOrder || basis.order > basis.n ||
       static_cast<int64_t>(basis.knots.size()) != basis.n + basis.order) {
     p.error(
         fmt::format("has {} points of order {} and {} knots along {}; expected as many points as the order or more, "

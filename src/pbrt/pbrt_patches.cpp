@@ -249,10 +249,10 @@ PbrtShape make_pbrt_subdivision(PbrtParameters& p, const PbrtPlacement& placemen
   if (!given) return {};
   const std::vector<double> indices = read_pbrt_indices(p, given->positions.size() / 3, 3);
   if (indices.empty()) return {};
-  constexpr double kMostFaces = 1 << 24;
-  if (levels < 0 || static_cast<double>(indices.size()) / 3 * std::pow(4.0, static_cast<double>(levels)) > kMostFaces) {
+  constexpr double kMaxFaces = 1 << 24;
+  if (levels < 0 || static_cast<double>(indices.size()) / 3 * std::pow(4.0, static_cast<double>(levels)) > kMaxFaces) {
     p.error(fmt::format("has {} levels for {} faces; at most {:.0f} faces are made", levels, indices.size() / 3,
-                        kMostFaces));
+                        kMaxFaces));
     return {};
   }
   std::vector<Point> points;

@@ -17,9 +17,9 @@ namespace covary {
 namespace {
 
 // Limits far above what scenes need, but low enough that no small file takes long or much memory.
-constexpr int kMostIncludes = 1000, kDeepest = 15;
-constexpr size_t kMostTextBytes = size_t{1} << 30;  // of all files together
-constexpr size_t kMostStates = 1000;
+constexpr int kMaxIncludes = 1000, kDeepest = 15;
+constexpr size_t kMaxTextBytes = size_t{1} << 30;  // of all files together
+constexpr size_t kMaxStates = 1000;
 
 constexpr std::string_view kDirectives =
     "Accelerator ActiveTransform AreaLightSource Attribute AttributeBegin AttributeEnd Camera ColorSpace "
@@ -81,8 +81,8 @@ class Reader {
 
   void read_file(std::string_view text, const std::string& name, PbrtTokens* outer, int depth) {
     n_text_bytes_ += text.size();
-    if (n_text_bytes_ > kMostTextBytes) {
-      messages_.error({name, 1, 1}, fmt::format("the scene has more than {} bytes of text", kMostTextBytes));
+    if (n_text_bytes_ > kMaxTextBytes) {
+      messages_.error({name, 1, 1}, fmt::format("the scene has more than {} bytes of text", kMaxTextBytes));
       throw PbrtStop();
     }
     digest_ += hash_text(hash_bytes(text)) + "\n";
@@ -291,9 +291,8 @@ class Reader {
 
   void include(const std::string& name, PbrtTokens& tokens, int depth) {
     const SourceLocation where = where_;
-    if (depth + 1 >= kDeepest || ++n_includes_ > kMostIncludes) {
-      messages_.error(where,
-                      fmt::format("more than {} files inside each other, or {} in all", kDeepest, kMostIncludes));
+    if (depth + 1 >= kDeepest || ++n_includes_ > kMaxIncludes) {
+      messages_.error(where, fmt::format("more than {} files inside each other, or {} in all", kDeepest, kMaxIncludes));
       throw PbrtStop();
     }
     Diagnostics missing;
@@ -322,8 +321,8 @@ class Reader {
     return {tokens, std::move(what), where_, messages_, context};
   }
   void push(bool whole) {
-    if (states_.size() >= kMostStates) {
-      messages_.error(where_, fmt::format("more than {} nested blocks", kMostStates));
+    if (states_.size() >= kMaxStates) {
+      messages_.error(where_, fmt::format("more than {} nested blocks", kMaxStates));
       throw PbrtStop();
     }
     states_.push_back({state_, whole, where_});

@@ -8,7 +8,7 @@
 namespace covary {
 namespace {
 
-constexpr size_t kMostObjects = 1000000;  // far above what scenes need
+constexpr size_t kMaxObjects = 1000000;  // far above what scenes need
 
 bool is_opaque(const Value& alpha) { return std::holds_alternative<double>(alpha) && std::get<double>(alpha) >= 1; }
 bool is_invisible(const Value& alpha) { return std::holds_alternative<double>(alpha) && std::get<double>(alpha) <= 0; }
@@ -16,8 +16,8 @@ bool is_invisible(const Value& alpha) { return std::holds_alternative<double>(al
 }  // namespace
 
 void PbrtWorld::add(const ObjectPtr& object) {
-  if (++n_objects_ > kMostObjects) {
-    messages_.error(object->where, fmt::format("more than {} objects", kMostObjects));
+  if (++n_objects_ > kMaxObjects) {
+    messages_.error(object->where, fmt::format("more than {} objects", kMaxObjects));
     throw PbrtStop();
   }
   set_property(*scene_, "", object);
@@ -43,7 +43,7 @@ void PbrtWorld::shape(const std::string& type, PbrtParameters& p, const PbrtStat
   list.push_back(made);
   curves_ = type == "curve" && is_opaque(*alpha) && !made.light ? &list.back() : nullptr;
   if (group_) {
-    if (++n_objects_ > kMostObjects) add(shape);  // throws
+    if (++n_objects_ > kMaxObjects) add(shape);  // throws
     group_->has_media |= made.inside || made.outside;
     set_property(*group_->object, "", ObjectPtr(shape));
   } else {

@@ -32,7 +32,7 @@ struct AdaptiveMethod {
   AdaptiveSampling sampling;
   std::string name;
   std::optional<int> groups;  ///< as requested
-  int fewest_groups = 1;
+  int min_groups = 1;
   DenoisedMean denoise;  ///< of a denoised mean, which includes the first pass
 
   /// Groups of both films.
@@ -50,12 +50,12 @@ uint32_t first_samples(const AdaptiveMethod& method, const PlanState& state) {
   if (method.sampling.first_spp) return static_cast<uint32_t>(*method.sampling.first_spp);
   const uint32_t groups = method.groups_of(state);
   if (method.denoise) {
-    const double part = std::max<double>(kShareOfFirst * state.budget, kFewestMixedSamples);
+    const double part = std::max<double>(kShareOfFirst * state.budget, kMinMixedSamples);
     return std::max(static_cast<uint32_t>(std::lround(part / groups)), 1u) * groups;
   }
   const auto part = static_cast<uint32_t>(kFirstShare * state.group_budget);
   const bool is_open = method.sampling.counts.relative_error && !state.request.spp;
-  const uint32_t samples = is_open ? kFirstOfError : std::min<uint32_t>(part, method.sampling.most_first_spp);
+  const uint32_t samples = is_open ? kFirstOfError : std::min<uint32_t>(part, method.sampling.max_first_spp);
   return std::max(samples / groups, 1u) * groups;
 }
 
@@ -69,9 +69,9 @@ double whole_budget(const AdaptiveMethod& method, const PlanState& state) {
 void check_groups(const AdaptiveMethod& method, const PlanState& state, uint32_t first) {
   if (!method.sampling.reads_groups) return;
   const uint32_t groups = method.groups_of(state);
-  if (groups < static_cast<uint32_t>(method.fewest_groups))
+  if (groups < static_cast<uint32_t>(method.min_groups))
     throw Error(ErrorCode::kUsage,
-                fmt::format("{} groups are too few: {} needs at least {}", groups, method.name, method.fewest_groups));
+                fmt::format("{} groups are too few: {} needs at least {}", groups, method.name, method.min_groups));
   if (first < groups)
     throw Error(ErrorCode::kUsage, fmt::format("dependent-spp is {}, expected at least {}, one sample for each group "
                                                "(`groups`)",
@@ -142,7 +142,7 @@ Plan adaptive_plan(const Method& estimator, std::optional<int> groups) {
     throw Error(ErrorCode::kUsage,
                 "`until` relative is for an image that is not denoised; relmse adds samples until a denoised one has a "
                 "wanted error");
-  const AdaptiveMethod method{*estimator.adaptive, estimator.name, groups, estimator.fewest_groups,
+  const AdaptiveMethod method{*estimator.adaptive, estimator.name, groups, estimator.min_groups,
                               is_denoised ? estimator.one_pass()->image : DenoisedMean()};
   Plan plan = plan_of(estimator);
   plan.takes_unfinished = is_denoised || (is_pair && !method.sampling.reads_groups);

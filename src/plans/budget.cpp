@@ -23,7 +23,7 @@ namespace {
 
 constexpr uint32_t kFirstBudget = 96;
 /// For the next budget towards a target error: a larger one overshoots, a smaller one checks more often.
-constexpr double kMargin = 1.02, kLeastGrowth = 1.06;
+constexpr double kMargin = 1.02, kMinGrowth = 1.06;
 
 /// Samples per second of the second of two trials, of which the first warms the caches. `render` takes one sample of
 /// each pixel and returns their number.
@@ -87,10 +87,10 @@ std::vector<uint32_t> samples_of_passes(const Shares& shares, uint32_t budget) {
 }
 
 int number_of_groups(const Shares& shares, const PlanState& state) {
-  constexpr uint32_t kMost = 12;
+  constexpr uint32_t kMax = 12;
   const std::vector<uint32_t> samples = samples_of_passes(shares, state.group_budget);
   if (state.request.seconds <= 0) return choose_groups(samples);
-  return static_cast<int>(std::min(kMost, *std::min_element(samples.begin(), samples.end())));
+  return static_cast<int>(std::min(kMax, *std::min_element(samples.begin(), samples.end())));
 }
 
 void set_budget(const Shares& shares, const PlanState& state, std::span<Pass> passes) {
@@ -119,7 +119,7 @@ double auxiliary_samples_per_second(const LoadedScene& scene, const FilterSettin
 }
 
 uint32_t next_budget(uint32_t budget, double predicted, double target, uint32_t limit, double most) {
-  const double factor = std::clamp(kMargin * predicted / target, kLeastGrowth, most);
+  const double factor = std::clamp(kMargin * predicted / target, kMinGrowth, most);
   return static_cast<uint32_t>(std::min<double>(limit, std::ceil(factor * budget)));
 }
 

@@ -39,7 +39,7 @@ void set_only_target(const PlanState& state, std::span<Pass> passes) {
 /// The same for all methods that need no more, so that they can share films: at least four groups.
 Shares shares_of(const Method& estimator, const PassChoice& choice) {
   constexpr int kEnough = 4;
-  const int fewest = choice.groups.value_or(std::max(kEnough, estimator.fewest_groups));
+  const int fewest = choice.groups.value_or(std::max(kEnough, estimator.min_groups));
   const std::array<double, 2> split = choice.split.value_or(std::array{0.5, 0.5});
   return {{split.begin(), split.end()}, static_cast<uint32_t>(fewest)};
 }
@@ -65,7 +65,7 @@ Plan plain_plan(Sampling sampling, std::optional<int> groups) {
     const bool reads_groups = sampling == Sampling::kCrn || state.request.until > 0;
     const int fewest = state.request.until > 0 ? 2 : 1;  // two for the error
     pass.groups = groups.value_or(reads_groups ? number_of_groups(whole_budget(fewest), state) : 1);
-    pass.fewest_groups = groups ? 0 : fewest;
+    pass.min_groups = groups ? 0 : fewest;
     return std::vector{pass};
   };
   phase.set_targets = set_only_target;
@@ -81,7 +81,7 @@ Plan independent_plan(const Method& estimator, std::optional<int> groups) {
     PassPlan pass;
     pass.name = "independent";
     pass.groups = groups.value_or(number_of_groups(whole_budget(1), state));
-    pass.fewest_groups = groups ? 0 : 1;
+    pass.min_groups = groups ? 0 : 1;
     return std::vector{pass};
   };
   phase.set_targets = set_only_target;
@@ -113,7 +113,7 @@ Plan pair_plan(const Method& estimator, const PassChoice& choice) {
   plan.groups_follow_speed = !choice.groups;
   const Shares shares = shares_of(estimator, choice);
   Phase phase;
-  phase.passes = [=, name = estimator.name, fewest = estimator.fewest_groups,
+  phase.passes = [=, name = estimator.name, fewest = estimator.min_groups,
                   chosen = choice.groups](const PlanState& state) {
     const int groups = chosen.value_or(number_of_groups(shares, state));
     if (groups < fewest)
@@ -123,7 +123,7 @@ Plan pair_plan(const Method& estimator, const PassChoice& choice) {
     std::vector<PassPlan> passes(2);
     passes[0].name = "crn", passes[0].sampling = Sampling::kCrn;
     passes[1].name = "independent";
-    for (PassPlan& pass : passes) pass.groups = groups, pass.fewest_groups = chosen ? 0 : fewest;
+    for (PassPlan& pass : passes) pass.groups = groups, pass.min_groups = chosen ? 0 : fewest;
     return passes;
   };
   phase.set_targets = [shares](const PlanState& state, std::span<Pass> passes) { set_budget(shares, state, passes); };
@@ -131,7 +131,8 @@ Plan pair_plan(const Method& estimator, const PassChoice& choice) {
   return plan;
 }
 
-MethodImage image_of(const Plan& plan, std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside) {
+MethodImage image_of(const Plan& plan, std::span<const Pass> passes, int first_row, int n_rows,
+                     const ExtraInputs& beside) {
   const Method& method = *plan.method;
   MethodSettings settings;
   settings.crn_samples = std::llround(passes[0].film.mean_count());

@@ -21,10 +21,10 @@
 namespace covary {
 namespace {
 
-constexpr double kShare = 0.06;        // fraction of the render's samples for trials, approximately
-constexpr uint32_t kSamples = 8;       // of each integrator at a pixel
-constexpr uint32_t kUsualBudget = 64;  // if the number of samples is unknown
-constexpr int kFewestPixels = 1000;    // pixels sampled, if the window has as many
+constexpr double kShare = 0.06;          // fraction of the render's samples for trials, approximately
+constexpr uint32_t kSamples = 8;         // of each integrator at a pixel
+constexpr uint32_t kDefaultBudget = 64;  // if the number of samples is unknown
+constexpr int kMinPixels = 1000;         // pixels sampled, if the window has as many
 constexpr double kClearlyBetter = 0.9;
 constexpr double kCutOff = 0.995;  // quantile that larger values are clamped to
 /// Changes the render's seed, so that trials share no numbers with its passes.
@@ -43,7 +43,7 @@ uint32_t training_of(const Integrator& integrator) {
 /// Samples per pixel of the render, as far as known.
 uint32_t budget_of(const LoadedScene& scene, const RenderRequest& request) {
   const bool is_open = !request.spp && (request.seconds > 0 || request.until > 0);
-  return is_open ? kUsualBudget : request.spp.value_or(static_cast<uint32_t>(scene.spp));
+  return is_open ? kDefaultBudget : request.spp.value_or(static_cast<uint32_t>(scene.spp));
 }
 
 /// Why an integrator is not tried; empty if it is. One that learns needs enough remaining samples to benefit from
@@ -61,7 +61,7 @@ class Trials {
       : scene_(scene), window_(window_of(scene, request)), stop_(stop) {
     const double area = static_cast<double>(window_.width) * window_.height;
     const double wanted = std::sqrt(samples / (kShare * budget_of(scene, request)));
-    stride_ = static_cast<int>(std::clamp(std::ceil(wanted), 1.0, std::max(1.0, std::sqrt(area / kFewestPixels))));
+    stride_ = static_cast<int>(std::clamp(std::ceil(wanted), 1.0, std::max(1.0, std::sqrt(area / kMinPixels))));
     filter_ = request.filter.value_or(scene.filter);
     seed_ = request.seed ^ kOtherSeed;
   }

@@ -150,7 +150,7 @@ TEST(LightPlan, AFolderOfPassesHoldsTheLightFilm) {
   Plan any = plain_plan(Sampling::kIndependent);
   any.phases[0].passes = [](const PlanState&) {
     PassPlan pass;
-    pass.name = "independent", pass.groups = 4, pass.fewest_groups = 2;
+    pass.name = "independent", pass.groups = 4, pass.min_groups = 2;
     return std::vector{pass};
   };
   EXPECT_EQ(render(scene, any, request).passes[1].film.groups(), 6);

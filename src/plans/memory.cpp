@@ -28,16 +28,16 @@ constexpr double kSplatBytes = 16e6;               // of a round of light paths,
 RenderMemory render_memory(const Plan& plan, std::span<const PassPlan> passes, int width, int height, bool aovs) {
   const double n_pixels = static_cast<double>(width) * height;
   RenderMemory memory;
-  int fewest_groups = std::numeric_limits<int>::max();
+  int min_groups = std::numeric_limits<int>::max();
   for (const PassPlan& pass : passes) {
-    fewest_groups = std::min(fewest_groups, pass.groups);
+    min_groups = std::min(min_groups, pass.groups);
     const double film = n_pixels * ((pass.groups + (pass.sample_variance ? 1 : 0)) * kImageBytes + sizeof(uint32_t));
     memory.films += film + (pass.light ? kSplatBytes : 0);
     if (pass.light && plan.makes_film()) memory.estimate += film;  // the sum of both films
   }
   if (aovs) memory.films += n_pixels * kAuxiliaryFeatures.size() * kImageBytes;
   // A copy for a viewer or the preview.
-  memory.estimate += plan.method->memory.bytes(n_pixels, fewest_groups) + n_pixels * kImageBytes;
+  memory.estimate += plan.method->memory.bytes(n_pixels, min_groups) + n_pixels * kImageBytes;
   return memory;
 }
 
@@ -58,7 +58,7 @@ RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const Ren
     const double images = static_cast<double>(n) * (2.0 * passes.back().groups + kImagesOfLayer);
     memory.films += window.width * window.height * images * kImageBytes;
   }
-  if (request.path_lengths) memory.films += window.width * window.height * kMostEdges * kImageBytes;
+  if (request.path_lengths) memory.films += window.width * window.height * kMaxEdges * kImageBytes;
   return memory;
 }
 

@@ -60,7 +60,7 @@ void write_costs(const Pass& pass) {
 /// Replaces the empty film with the one at pass.path, which it must match.
 void resume(const RenderRequest& request, Pass& pass) {
   const std::string frame = frame_text(pass.film);
-  const int groups = pass.film.groups(), fewest = pass.plan.fewest_groups;
+  const int groups = pass.film.groups(), fewest = pass.plan.min_groups;
   const std::map<std::string, std::string> attributes = std::move(pass.film.attributes);
   pass.film = Film();  // both might not fit into memory
   Film film = read_film(pass.path);

@@ -32,7 +32,7 @@ struct PassPlan {
   int groups = 1;  ///< of the film
   /// The number of groups follows from the samples or the speed; a resumed film may have this number or more. 0:
   /// exactly `groups`.
-  int fewest_groups = 0;
+  int min_groups = 0;
   bool sample_variance = false;  ///< the film keeps the variance of samples
   PixelEstimate estimate;        ///< PassSettings::estimate
   /// A light pass (passes/light_pass.h): the film's samples are bundles of light paths, and the number in its
@@ -96,7 +96,7 @@ struct Phase {
 };
 
 /// What a method may read in addition to the films, for its rows.
-struct Beside {
+struct ExtraInputs {
   Features features;          ///< if Method::reads_features
   std::vector<Layer> layers;  ///< if Method::splits_layers(); empty if none were requested
 };
@@ -120,7 +120,8 @@ struct Plan {
 
 /// Rows first_row … first_row + n_rows - 1 of the image, from the current films of the camera's passes. Its cost
 /// depends on the size, not on sample counts.
-MethodImage image_of(const Plan& plan, std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside);
+MethodImage image_of(const Plan& plan, std::span<const Pass> passes, int first_row, int n_rows,
+                     const ExtraInputs& beside);
 
 /// The passes without the light pass, which is the last if there is one.
 std::span<const Pass> camera_passes(std::span<const Pass> passes);

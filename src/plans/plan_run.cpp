@@ -24,7 +24,7 @@ namespace {
 
 /// Largest factor from one budget to the next towards a target error; smaller if the predicted error is unreliable, so
 /// that a prediction that is far too large costs fewer samples before the next check.
-constexpr double kMostGrowth = 4, kDoubtfulGrowth = 2;
+constexpr double kMaxGrowth = 4, kDoubtfulGrowth = 2;
 
 std::string filter_text(const FilterSettings& filter) {
   switch (filter.kind) {
@@ -145,7 +145,7 @@ bool PlanRun::render_to_limits() {
     if (request_.until > 0) result_.until_reached = error <= request_.until;
     if (result_.until_reached.value_or(true) || state_.budget >= limit || out_of_time) return true;
     rounds_.add(next_budget(state_.budget, error, request_.until, limit,
-                            result_.predicted->doubt.empty() ? kMostGrowth : kDoubtfulGrowth));
+                            result_.predicted->doubt.empty() ? kMaxGrowth : kDoubtfulGrowth));
     state_.budget = rounds_.budget();
   }
 }

@@ -27,14 +27,14 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Seconds of work after which films are worth saving, even unasked, before the image is computed from them.
-constexpr double kWorthKeeping = 10;
+constexpr double kMinSecondsWorthACheckpoint = 10;
 constexpr double kEstimateOfInterrupted = 0.5;  // seconds allowed for it; after that the image is the mean
 
 }  // namespace
 
 EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows, std::span<const Film> layers) const {
   std::array<Image, 5> images;
-  Beside beside{features(), {}};
+  ExtraInputs beside{features(), {}};
   Features& g = beside.features;
   for (size_t i = 0;
        const Image** guide : {&g.albedo, &g.normal, &g.denoising_albedo, &g.denoising_normal, &g.position})
@@ -138,7 +138,7 @@ bool PlanRun::try_to_keep_films(bool complete, const char* then) {
 /// Saves films that took long before anything else is done with them.
 void PlanRun::keep_films_before_more() {
   const bool asked = !request_.passes.empty();
-  if (unsaved_ && (asked || since_checkpoint_.seconds() > kWorthKeeping))
+  if (unsaved_ && (asked || since_checkpoint_.seconds() > kMinSecondsWorthACheckpoint))
     try_to_keep_films(!stopped(), "the image is made nevertheless");
 }
 

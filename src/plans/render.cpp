@@ -20,13 +20,13 @@ namespace covary {
 namespace {
 
 void check_light_groups(const LoadedScene& scene) {
-  constexpr size_t kMost = 32;
+  constexpr size_t kMax = 32;
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   const std::vector<std::string> groups = light_groups(*scene.scene);
   if (groups.empty()) usage("`layers` light-groups: no light of the scene has an id, by which it belongs to a group");
-  if (groups.size() > kMost)
+  if (groups.size() > kMax)
     usage(fmt::format("`layers` light-groups: the lights have {} ids; at most {} are distinguished", groups.size(),
-                      kMost));
+                      kMax));
   if (!integrator_of(scene).by_light(groups))
     usage("`layers` light-groups needs an integrator that separates lights: path");
 }

@@ -69,7 +69,7 @@ struct RenderRequest {
   std::function<std::string()> made_by;
 };
 
-inline constexpr double kMostSamples = 1 << 30;
+inline constexpr double kMaxSamples = 1 << 30;
 inline constexpr OptionTraits kBasicPasses{.level = OptionLevel::kBasic, .effect = OptionEffect::kPasses};
 inline constexpr OptionTraits kBasicSamples{.level = OptionLevel::kBasic, .effect = OptionEffect::kSamples};
 
@@ -83,7 +83,7 @@ inline void declare_goal(Settings& s, RenderRequest& r) {
   s.group("Rendering");
   s.text("output", r.output, "FILE", "The image (EXR); a PNG preview appears beside it",
          {.letter = "o", .level = OptionLevel::kBasic, .names = OptionNames::kFile});
-  s.whole("spp", r.spp, {.low = 1, .high = kMostSamples}, "Samples per pixel over all passes; default: the scene's",
+  s.whole("spp", r.spp, {.low = 1, .high = kMaxSamples}, "Samples per pixel over all passes; default: the scene's",
           kBasicPasses);
   s.text_as("until", r, "relmse=X", read_until,
             "Add samples, up to `spp`, until the predicted error is X; relmse-p95=X: in 95 % of 16 x 16 blocks; "

@@ -98,7 +98,7 @@ void declare(Settings& s, RenderSettings& v) {
                "How samples become the image; {}: their mean. Others than the default are denoised only by `denoise`",
                kNoEstimator),
            kBasicPasses);
-  v.denoising.mode = usual_denoising(v.estimator);
+  v.denoising.mode = default_denoising(v.estimator);
   declare(s, v.denoising, false);
   declare_device(s, v.device);
   s.group("Rendering");

@@ -290,7 +290,7 @@ TEST(Budget, IsTakenToTheSample) {
   using Taken = std::vector<std::pair<uint32_t, int>>;
   Method method;
   PassChoice choice;
-  method.name = "average", method.fewest_groups = 3;
+  method.name = "average", method.min_groups = 3;
   PassPair passes;
   passes.image = [](const GroupedImage&, const GroupedImage&, const MethodSettings&) {
     return EstimatorResult{.estimate = Image(3, 2, 3)};
@@ -303,14 +303,14 @@ TEST(Budget, IsTakenToTheSample) {
   EXPECT_EQ(pair(25), (Taken{{13, 12}, {12, 12}}));
   EXPECT_EQ(pair(9), (Taken{{5, 4}, {4, 4}}));
   EXPECT_EQ(pair(7), (Taken{{4, 4}, {4, 4}})) << "as few as every method can use";
-  method.fewest_groups = 4;
+  method.min_groups = 4;
   for (uint32_t spp : {6u, 7u, 8u, 9u, 13u, 25u}) {
     const Taken more = pair(spp);
-    method.fewest_groups = 3;
+    method.min_groups = 3;
     EXPECT_EQ(pair(spp), more) << "methods that share films agree";
-    method.fewest_groups = 4;
+    method.min_groups = 4;
   }
-  method.fewest_groups = 3, choice.groups = 3;
+  method.min_groups = 3, choice.groups = 3;
   EXPECT_EQ(pair(7), (Taken{{4, 3}, {3, 3}}));
   choice.split = {0.25, 0.75};
   EXPECT_EQ(pair(33), (Taken{{8, 3}, {25, 3}}));

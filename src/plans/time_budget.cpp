@@ -14,7 +14,7 @@ namespace {
 constexpr double kFirstPart = 0.3, kPart = 0.4;
 /// Part of a time that is too short for the first round: an image whose end takes most of the time would hardly be
 /// earlier without its samples.
-constexpr double kLeastShare = 0.15;
+constexpr double kMinShare = 0.15;
 
 /// Rows of two trials of the end, whose difference leaves out what does not depend on the size.
 constexpr int kFewRows = 16, kMoreRows = 48;
@@ -45,7 +45,7 @@ TimePlan plan_time(const TimeCosts& costs, double seconds, uint32_t fewest, uint
     left -= plan.aov_samples * costs.auxiliary;
   }
   const bool too_short = left < fewest * costs.sample;
-  plan.samples = std::max(fewest, whole((too_short ? kLeastShare / kFirstPart * seconds : left) / costs.sample));
+  plan.samples = std::max(fewest, whole((too_short ? kMinShare / kFirstPart * seconds : left) / costs.sample));
   plan.seconds = costs.end + plan.aov_samples * costs.auxiliary + plan.samples * costs.sample;
   return plan;
 }

@@ -74,7 +74,7 @@ double PlanRun::end_of_band(int n_rows, std::span<const PassPlan> plans) {
   if (needs_aovs())
     for (const AuxiliaryFeature& feature : kAuxiliaryFeatures)
       result.aovs[feature.layer] = made_up_image(band.width, n_rows);
-  Beside beside;
+  ExtraInputs beside;
   if (plan_.method->reads_features) beside.features = features_among(result.aovs);
   const Stopwatch watch;
   if (!plan_.makes_film() && !request_.films_only)

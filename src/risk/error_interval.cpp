@@ -18,7 +18,7 @@ namespace {
 /// Relative scatter at which the samples' estimate and the typical value have equal weight.
 constexpr double kTrusted = 0.5;
 /// Bounds of the error as multiples of the variance.
-constexpr double kLeastOverVariance = 0.5, kMostOverVariance = 30;
+constexpr double kMinOverVariance = 0.5, kMaxOverVariance = 30;
 /// Fraction of the covariance that halves miss (docs/notes/error-estimates.md).
 constexpr double kMissingCovariance = 0.27;
 
@@ -27,9 +27,9 @@ struct Ratio {
   double log = 0, hidden = 1;
 };
 
-/// R, but at least kLeastOverVariance V.
+/// R, but at least kMinOverVariance V.
 double risk_of(const RiskRow& s) {
-  return std::max(s.error + kMissingCovariance * s.covariance, kLeastOverVariance * s.variance);
+  return std::max(s.error + kMissingCovariance * s.covariance, kMinOverVariance * s.variance);
 }
 
 /// log(R / V), shrunk by noise.
@@ -37,7 +37,7 @@ Ratio ratio_of(const RiskRow& s) {
   const double least = risk_of(s);
   const double scatter = std::sqrt(std::max(0.0, s.squares - s.error * s.error / std::max(s.parts, 1.0))) / least;
   const double trust = 1 / (1 + scatter * scatter / (kTrusted * kTrusted));
-  return {trust * std::log(std::min(least / s.variance, kMostOverVariance)), 1 - trust};
+  return {trust * std::log(std::min(least / s.variance, kMaxOverVariance)), 1 - trust};
 }
 
 double dot(const ErrorFeatures& a, const ErrorFeatures& b) {
@@ -59,7 +59,7 @@ void scale_candidates(MeasuredRisks& risks, double factor, double variance_over_
 bool fitted_to_few(ErrorKind kind) { return kind == ErrorKind::kFilters || kind == ErrorKind::kNetwork; }
 
 bool is_mixture(ErrorKind kind, double groups) {
-  return kind != ErrorKind::kMean && kind != ErrorKind::kPair && groups >= kFewestGroups;
+  return kind != ErrorKind::kMean && kind != ErrorKind::kPair && groups >= kMinGroups;
 }
 
 /// Fraction of log(relMSE / V) explained by an image's features: less, the closer a mixture is to the mean.
@@ -69,12 +69,12 @@ double not_the_mean(const RiskRow& sums, ErrorKind kind) {
 }
 
 const FittedErrors& fit_of(ErrorKind kind, double groups) {
-  if (groups < kFewestGroups && fitted_to_few(kind)) return kFittedToFew[kind == ErrorKind::kNetwork];
+  if (groups < kMinGroups && fitted_to_few(kind)) return kFittedToFew[kind == ErrorKind::kNetwork];
   return kFittedErrors[static_cast<size_t>(kind)];
 }
 
 /// Whether few pixels hold most of the noise.
-bool hold_most_noise(const RiskRow& sums) { return sums.noise * sums.noise < kFewestPixels * sums.noise_squares; }
+bool hold_most_noise(const RiskRow& sums) { return sums.noise * sums.noise < kMinPixels * sums.noise_squares; }
 
 double share_of_largest(const RiskRow& sums) { return sums.light > 0 ? sums.light_of_largest / sums.light : 1; }
 
@@ -100,32 +100,32 @@ LogError fitted_error(const RiskRow& sums, ErrorKind kind) {
   LogError error;
   const double part = not_the_mean(sums, kind);
   error.middle = std::log(sums.variance / sums.values) + part * dot(fit.middle, x);
-  const double spread = std::exp(std::clamp(dot(fit.log_spread, x), fit.least_log_spread, fit.most_log_spread));
+  const double spread = std::exp(std::clamp(dot(fit.log_spread, x), fit.min_log_spread, fit.max_log_spread));
   error.low = error.middle + fit.low * spread, error.high = error.middle + fit.high * spread;
   if (is_mixture(kind, sums.groups)) {  // R sees light that the mixture left out; of few groups it is too noisy
     const double risk = std::log(sums.variance / sums.values) + part * std::log(risk_of(sums) / sums.variance);
-    error.high = std::max(error.high, std::min(risk, error.middle + std::log(kMostFactor)));
+    error.high = std::max(error.high, std::min(risk, error.middle + std::log(kMaxFactor)));
   }
   return error;
 }
 
 bool has_rare_light(const RiskRow& sums) {
   const double share = share_of_largest(sums);
-  return (share - 1 / sums.groups) / (1 - 1 / sums.groups) > kMostOfLargest;  // 0 if all groups hold equal shares
+  return (share - 1 / sums.groups) / (1 - 1 / sums.groups) > kMaxOfLargest;  // 0 if all groups hold equal shares
 }
 
 std::string unknown_error(const RiskRow& sums, ErrorKind kind, const LogError& error) {
-  if (sums.groups < kFewestGroups && !fitted_to_few(kind))
-    return fmt::format("{:.0f} groups of samples are too few; {} are needed", sums.groups, kFewestGroups);
+  if (sums.groups < kMinGroups && !fitted_to_few(kind))
+    return fmt::format("{:.0f} groups of samples are too few; {} are needed", sums.groups, kMinGroups);
   const double n = sums.noise * sums.noise / sums.noise_squares, pixels = sums.values / 3;
   if (hold_most_noise(sums))
     return fmt::format("{:.0f} of {:.0f} pixels hold most of the noise", std::max(1.0, n), pixels);
   if (has_rare_light(sums))
     return fmt::format("{:.0f} % of the light is in one of {:.0f} groups of each pixel", 100 * share_of_largest(sums),
                        sums.groups);
-  if (not_the_mean(sums, kind) * sums.specular_noise > kMostSpecular * sums.noise)  // of what the mixture removes
+  if (not_the_mean(sums, kind) * sums.specular_noise > kMaxSpecular * sums.noise)  // of what the mixture removes
     return fmt::format("{:.0f} % of the noise is in mirrors or behind glass", 100 * sums.specular_noise / sums.noise);
-  if (std::max(error.high - error.middle, error.middle - error.low) > std::log(kMostFactor))
+  if (std::max(error.high - error.middle, error.middle - error.low) > std::log(kMaxFactor))
     return "few samples hold most of the light";
   return "";
 }
@@ -139,7 +139,7 @@ void take_fireflies(EstimatorResult& result) {
   const Fireflies fireflies = fireflies_in(result);
   const double spread = hold_most_noise(sums) ? sums.spread / sums.values : 0;
   const double own = predicted_relmse(result), hidden = std::max(fireflies.relmse, spread);
-  if (!(hidden > kMostFactor * own * result.interval->middle)) return;
+  if (!(hidden > kMaxFactor * own * result.interval->middle)) return;
   std::string unknown = result.interval->unknown;
   if (unknown.empty() || fireflies.relmse > spread)
     unknown = fmt::format(

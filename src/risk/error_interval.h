@@ -33,11 +33,11 @@ using ErrorFeatures = std::array<double, kErrorFeatures>;
 /// method smooths halves more than the whole (docs/notes/error-estimates.md).
 ErrorFeatures error_features(const RiskRow& sums);
 
-/// The distribution of log(relMSE). The upper bound of a mixture of kFewestGroups groups or more is at least R.
+/// The distribution of log(relMSE). The upper bound of a mixture of kMinGroups groups or more is at least R.
 struct LogError {
   double middle = 0, low = 0, high = 0;
 };
-/// Denoised means of fewer than kFewestGroups groups, such as two renders, have separate fits, because the kurtosis of
+/// Denoised means of fewer than kMinGroups groups, such as two renders, have separate fits, because the kurtosis of
 /// few groups is uninformative and v is noisier.
 LogError fitted_error(const RiskRow& sums, ErrorKind kind);
 

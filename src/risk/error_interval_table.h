@@ -7,9 +7,9 @@
 namespace covary {
 
 struct FittedErrors {
-  ErrorFeatures middle, log_spread;          ///< a, b
-  double least_log_spread, most_log_spread;  ///< of the renders that were fitted
-  double low, high;                          ///< quantiles of r
+  ErrorFeatures middle, log_spread;       ///< a, b
+  double min_log_spread, max_log_spread;  ///< of the renders that were fitted
+  double low, high;                       ///< quantiles of r
 };
 
 // clang-format off
@@ -33,7 +33,7 @@ inline constexpr FittedErrors kFittedErrors[] = {
      {-0.02002, 0, 0.402, 0, 0, -0.01684, -0.2482, -0.001854, 0},
      -2.11, -0.6056, -4.257, 0.5273},
 };
-/// For denoised means of fewer than kFewestGroups groups: by filters, by a network.
+/// For denoised means of fewer than kMinGroups groups: by filters, by a network.
 inline constexpr FittedErrors kFittedToFew[] = {
     {{-3.814, -0.1735, 0.7402, 0.4716, -0.36, 0.2755, 0.2332, -0.2391, 0.4489},
      {0.1127, 0, -1.515, 0, 0, -0.04931, -0.1346, -0.4538, 0},
@@ -47,7 +47,7 @@ inline constexpr FittedErrors kFittedToFew[] = {
 /// There is no interval if the largest group of each pixel has a larger fraction of the light that is not common to all
 /// groups, if the bounds are wider than this factor, if a larger fraction of the noise is in mirrors or behind glass,
 /// if fewer pixels hold the noise, or if there are fewer groups and the kind has no separate fit for few groups.
-inline constexpr double kMostOfLargest = 0.55, kMostFactor = 5, kMostSpecular = 0.5;
-inline constexpr int kFewestPixels = 20, kFewestGroups = 8;
+inline constexpr double kMaxOfLargest = 0.55, kMaxFactor = 5, kMaxSpecular = 0.5;
+inline constexpr int kMinPixels = 20, kMinGroups = 8;
 
 }  // namespace covary

@@ -136,7 +136,7 @@ TEST(ErrorInterval, OfAMixtureReachesToTheRiskThatSamplesTell) {
     sums.error = 400, sums.squares = 400 * 400;  // noisy, so that the middle hardly changes
     const double risk = std::log(sums.variance / sums.values) + 0.95 * std::log((400 + 0.27 * 180) / 45);
     const LogError error = fitted_error(sums, kind);
-    EXPECT_NEAR(error.high, std::min(risk, error.middle + std::log(kMostFactor)), 1e-12);
+    EXPECT_NEAR(error.high, std::min(risk, error.middle + std::log(kMaxFactor)), 1e-12);
     EXPECT_GT(error.high, usual + 0.1);
     sums.groups = 4;
     const FittedErrors& fit =

@@ -13,14 +13,14 @@ namespace {
 
 using namespace lanes;
 
-constexpr int kRadii[] = {3, 7};       // radii in cells, the narrow window first
-constexpr int kBorder = 7;             // largest radius
-constexpr float kBandwidth = 0.5f;     // relative to the target's brightness
-constexpr float kLeastSquare = 1e-4f;  // minimum squared bandwidth
-constexpr float kSignificant = 3;      // standard errors
-constexpr float kFewestCells = 20;     // similar cells: fewer determine their noise too poorly
+constexpr int kRadii[] = {3, 7};     // radii in cells, the narrow window first
+constexpr int kBorder = 7;           // largest radius
+constexpr float kBandwidth = 0.5f;   // relative to the target's brightness
+constexpr float kMinSquare = 1e-4f;  // minimum squared bandwidth
+constexpr float kSignificant = 3;    // standard errors
+constexpr float kMinCells = 20;      // similar cells: fewer determine their noise too poorly
 constexpr float kPixels = kBiasCell * kBiasCell;
-constexpr float kLeastRelative = 1e-4f;  // relative to the brightness: smaller values are rounding errors
+constexpr float kMinRelative = 1e-4f;  // relative to the brightness: smaller values are rounding errors
 static_assert(kBiasReach >= (kBorder + 1) * kBiasCell);
 
 /// Planes of cells: guides of both halves (kFar where no pixel is valid), sums of M - h for both, half the square of
@@ -93,7 +93,7 @@ GuidedMean guided_mean(const Planes& cells, int half, int radius, int x, int y) 
   const vfloat grey = (g[0] + g[1] + g[2]) * (1.0f / 3);
   GuidedMean sums;
   vfloat weights = {}, squares = {}, counts = {}, relative[3] = {};
-  const vfloat squared_bandwidth = kBandwidth * kBandwidth * grey * grey + kLeastSquare;
+  const vfloat squared_bandwidth = kBandwidth * kBandwidth * grey * grey + kMinSquare;
   add_alike({cells, guide, radius}, x, y, g, squared_bandwidth, [&](vfloat weight, int column, int row) {
     const auto at = [&](int plane) { return load(cells.row(plane, row) + column); };
     const vfloat count = at(kCount);
@@ -119,9 +119,9 @@ GuidedMean guided_mean(const Planes& cells, int half, int radius, int x, int y) 
 /// The bias from both halves' means, zero if not significant.
 vfloat significant(const GuidedMean& of_a, const GuidedMean& of_b, int c, vfloat brightness) {
   const vfloat a = of_a.mean[c], b = of_b.mean[c], variance = 0.25f * (of_a.variance[c] + of_b.variance[c]);
-  const vfloat bias = 0.5f * (a + b), square = bias * bias, difference = a - b, least = kLeastRelative * brightness;
+  const vfloat bias = 0.5f * (a + b), square = bias * bias, difference = a - b, least = kMinRelative * brightness;
   const auto is_bias = (square > kSignificant * kSignificant * variance) & (difference * difference < square) &
-                       (square > least * least) & (min(of_a.cells, of_b.cells) > kFewestCells);
+                       (square > least * least) & (min(of_a.cells, of_b.cells) > kMinCells);
   return is_bias ? bias - variance / bias : vfloat{};
 }
 

@@ -23,7 +23,7 @@ constexpr int kPart = 16;
 /// Relative standard error of the held-out error at which it counts as much as the estimator's own prediction.
 constexpr double kTrusted = 0.3;
 /// Minimum error of the whole over the variance of the halves: one half, less a margin for noise.
-constexpr double kLeastOverVariance = 0.25;
+constexpr double kMinOverVariance = 0.25;
 
 HeldOutRow sum_of(const std::vector<HeldOutRow>& rows) {
   HeldOutRow all;
@@ -46,7 +46,7 @@ double trust_in(const HeldOutRow& all) { return 1 / (1 + squared_uncertainty(all
 
 /// The squared error of the image of all samples.
 double error_of_whole(const HeldOutRow& all) {
-  return std::max(all.error - 0.5 * all.variance, kLeastOverVariance * all.variance);
+  return std::max(all.error - 0.5 * all.variance, kMinOverVariance * all.variance);
 }
 
 /// Squared errors and variance of the halves in a row.
@@ -105,8 +105,8 @@ double place(const Image& disagreement, const Image& weights, Image& std_error) 
 MethodImage image_with_rows(const Method& base, const GroupedImage& crn, const GroupedImage& independent,
                             const MethodSettings& settings) {
   MethodImage whole = base.image({crn, independent}, settings);
-  if (!settings.std_error || !settings.held_out || crn.groups < 2 * base.fewest_groups ||
-      independent.groups < 2 * base.fewest_groups)
+  if (!settings.std_error || !settings.held_out || crn.groups < 2 * base.min_groups ||
+      independent.groups < 2 * base.min_groups)
     return whole;
   MethodSettings half_settings = settings;
   half_settings.std_error = false;
@@ -137,7 +137,7 @@ Method with_held_out_rows(const Method& base) {
   // The images and moments of both halves, the moments of all samples, and half of the groups of both images.
   method.memory.of_halves = (2 * (3 + 6) + 6) * sizeof(float);
   method.memory.of_halves_per_group = 3 * sizeof(float);
-  method.memory.groups_for_halves = 2 * base.fewest_groups;
+  method.memory.groups_for_halves = 2 * base.min_groups;
   if (base.reach >= 0) method.reach += kBiasReach;
   std::get<PassPair>(method.passes).image = [base](const GroupedImage& crn, const GroupedImage& independent,
                                                    const MethodSettings& settings) {

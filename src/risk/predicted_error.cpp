@@ -19,9 +19,9 @@ namespace {
 constexpr int kBlock = 16;
 constexpr double kShareOfBlocks = 0.95;
 
-/// Limits of doubt_of(). In an image with fewer than kFewestPixels pixels, 1 % of them is too few to judge.
-constexpr double kFewPixels = 0.01, kMostInFewPixels = 0.4;
-constexpr size_t kFewestPixels = 400;
+/// Limits of doubt_of(). In an image with fewer than kMinPixels pixels, 1 % of them is too few to judge.
+constexpr double kFewPixels = 0.01, kMaxInFewPixels = 0.4;
+constexpr size_t kMinPixels = 400;
 
 constexpr double kDarkest = 0.1;  // the root of relMSE's 0.01
 
@@ -64,7 +64,7 @@ double share_of_few(const EstimatorResult& result) {
   for (int y = 0; y < result.estimate.height; ++y)
     for (int x = 0; x < result.estimate.width; ++x)
       if (const double error = predicted_at(result, x, y); std::isfinite(error)) errors.push_back(error);
-  if (errors.size() < kFewestPixels) return 0;
+  if (errors.size() < kMinPixels) return 0;
   const auto few = errors.begin() + static_cast<ptrdiff_t>(kFewPixels * static_cast<double>(errors.size()));
   std::nth_element(errors.begin(), few, errors.end(), std::greater<>());
   const double all = std::accumulate(errors.begin(), errors.end(), 0.0);
@@ -117,7 +117,7 @@ std::string doubt_of(const EstimatorResult& result, double samples, uint32_t rel
     return factor > kReliableFactor ? fmt::format("known to a factor of {:.2g}", factor) : "";
   }
   if (samples < reliable_samples) return fmt::format("fewer than {} samples per pixel", reliable_samples);
-  if (const double share = share_of_few(result); share > kMostInFewPixels)
+  if (const double share = share_of_few(result); share > kMaxInFewPixels)
     return fmt::format("{:.0f} % of it lies in {:.0f} % of the pixels", 100 * share, 100 * kFewPixels);
   return "";
 }

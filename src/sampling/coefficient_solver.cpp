@@ -11,7 +11,7 @@ namespace {
 
 // Minimum weight of the prior, relative to the diagonal: it decides what samples leave undetermined and changes other
 // coefficients by 1e-8.
-constexpr double kLeastPrior = 1e-8;
+constexpr double kMinPrior = 1e-8;
 
 using Layout = SystemLayout;
 using Rgb = Eigen::Array3d;
@@ -36,7 +36,7 @@ class Prior {
     const double weight = system.head[Layout::kWeight];
     if (weight > 0) weight_ = settings.prior_samples * system.head[Layout::kWeightSquared] / weight;
   }
-  double diagonal(double a) const { return a * (1 + kLeastPrior) + weight_; }
+  double diagonal(double a) const { return a * (1 + kMinPrior) + weight_; }
 
  private:
   double weight_ = 0;

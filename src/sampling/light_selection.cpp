@@ -22,11 +22,11 @@ PowerLights::PowerLights(const Scene& scene) : emitters_(scene.emitters()) {
 }
 
 std::vector<double> weights_by_power(std::span<const LightPower> lights) {
-  constexpr double kLeast = 0.01;  // of the mean
+  constexpr double kMin = 0.01;  // of the mean
   double sum = 0;
   for (const LightPower& light : lights) sum += light.power;
   if (!std::isfinite(sum) || !(sum > 0)) return std::vector<double>(lights.size(), 1.0);
-  const double least = kLeast * sum / static_cast<double>(lights.size());
+  const double least = kMin * sum / static_cast<double>(lights.size());
   std::vector<double> weights;
   for (const LightPower& light : lights) weights.push_back(light.exact ? light.power : std::max(light.power, least));
   return weights;

@@ -16,7 +16,7 @@ std::string SourceLocation::text() const {
 
 namespace {
 
-constexpr size_t kMostShown = 100;  // errors in one message
+constexpr size_t kMaxShown = 100;  // errors in one message
 
 }  // namespace
 
@@ -81,11 +81,11 @@ void Diagnostics::throw_if_errors() const {
       std::unique(sorted.begin(), sorted.end(), [&](const Entry& a, const Entry& b) { return key(a) == key(b); }),
       sorted.end());
   std::string text;
-  for (size_t i = 0; i < std::min(sorted.size(), kMostShown); ++i) {
+  for (size_t i = 0; i < std::min(sorted.size(), kMaxShown); ++i) {
     if (!text.empty()) text += '\n';
     text += located(sorted[i].where, sorted[i].message);
   }
-  if (sorted.size() > kMostShown) text += fmt::format("\n… and {} more errors", sorted.size() - kMostShown);
+  if (sorted.size() > kMaxShown) text += fmt::format("\n… and {} more errors", sorted.size() - kMaxShown);
   throw Error(ErrorCode::kInput, text);
 }
 

@@ -11,7 +11,7 @@ namespace covary {
 namespace {
 
 constexpr int kPixels = kWeighedCell * kWeighedCell;
-constexpr float kLeastBrightness = 1e-10f, kMostSquare = 1e6f;
+constexpr float kMinBrightness = 1e-10f, kMaxSquare = 1e6f;
 
 using Colours = std::array<std::array<float, 3>, kPixels>;
 
@@ -28,7 +28,7 @@ Colours cell_of(const Image& image, int x, int y) {
 
 /// From squares of any size to [-1, 1).
 float rooted(float square) {
-  const float root = std::sqrt(std::sqrt(std::min(square, kMostSquare)));
+  const float root = std::sqrt(std::sqrt(std::min(square, kMaxSquare)));
   return 2 * root / (root + 0.3f) - 1;
 }
 
@@ -77,7 +77,7 @@ float around(const Planes& brightness, int x, int y) {
   float sum = 0;
   for (int j = y - 1; j <= y + 1; ++j)
     for (int i = x - 1; i <= x + 1; ++i) sum += brightness.row(0, j)[i];
-  return std::max(sum / 9, kLeastBrightness);
+  return std::max(sum / 9, kMinBrightness);
 }
 
 /// Appends features of a cell.

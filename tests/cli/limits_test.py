@@ -36,7 +36,7 @@ class Limits(unittest.TestCase):
         self.folder = tempfile.TemporaryDirectory()
         self.addCleanup(self.folder.cleanup)
         self.path = Path(self.folder.name)
-        self.most_memory = MEMORY
+        self.max_memory = MEMORY
 
     def write(self, name, content):
         (self.path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
@@ -57,7 +57,7 @@ class Limits(unittest.TestCase):
         self.assertIn(child.returncode, (0, 1, 2), text)
         self.assertNotIn("internal error", text)
         if not SANITIZED:
-            self.assertLess(usage.ru_maxrss * 1024, self.most_memory, arguments)
+            self.assertLess(usage.ru_maxrss * 1024, self.max_memory, arguments)
         return child.returncode, text
 
     def refused(self, message, *arguments, environment=None):
@@ -197,10 +197,10 @@ class Limits(unittest.TestCase):
         self.write("big.exr", self.black_exr(4000, 2200))
         self.write("wide.exr", self.black_exr(64000, 64))
         self.assertEqual(self.run_limited("compare", "big.exr", "-r", "big.exr", environment=limited)[0], 0)
-        self.most_memory = 60e6  # not even one copy is read
+        self.max_memory = 60e6  # not even one copy is read
         self.refused("an image of 4000 x 2200 pixels needs 316.8 MB ", "view", "big.exr", "-o", "a.html",
                      environment=limited)
-        self.most_memory = MEMORY
+        self.max_memory = MEMORY
         self.refused("an image of 64000 x 36 pixels needs ", "compare", "wide.exr", "-r", "wide.exr", "--metric",
                      "flip", environment=limited)
         self.refused("an image of 4000 x 2000 pixels needs 384.0 MB ", "convert", "a.exr", "a.exr", "out.exr",
@@ -230,7 +230,7 @@ class Limits(unittest.TestCase):
 
     def test_meshes_many_times(self):
         """Instances of a mesh that emits are copies; a file that is named many times is read as often."""
-        self.most_memory = 250e6
+        self.max_memory = 250e6
         limited = {"COVARY_MEMORY": "0.2"}
         self.write("a.ply", self.grid(150))
         mesh = '<shape type="ply"><string name="filename" value="a.ply"/>{}</shape>'

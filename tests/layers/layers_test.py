@@ -156,11 +156,11 @@ class Planted(unittest.TestCase):
 
     def test_constant_that_hides_another(self):
         self.write("src/io/CMakeLists.txt", "covary_module(io TOGETHER\n  SOURCES a.cpp b.cpp)\n")
-        self.write("src/io/a.cpp", SPDX + "namespace covary {\nnamespace {\n\nconstexpr int kMost = 3, kLeast = 1;\n\n"
+        self.write("src/io/a.cpp", SPDX + "namespace covary {\nnamespace {\n\nconstexpr int kMax = 3, kMin = 1;\n\n"
                    "}  // namespace\n}\n")
-        self.write("src/io/b.cpp", SPDX + "int all() { return kMost + Path::kLeast; }\n")
-        self.write("src/io/c.cpp", SPDX + "int all() {\n  constexpr int kMost = 2;\n  return kMost;\n}\n")
-        self.expect(layers.together_hides_no_constant, "src/io/b.cpp:1: kMost would be that of src/io/a.cpp")
+        self.write("src/io/b.cpp", SPDX + "int all() { return kMax + Path::kMin; }\n")
+        self.write("src/io/c.cpp", SPDX + "int all() {\n  constexpr int kMax = 2;\n  return kMax;\n}\n")
+        self.expect(layers.together_hides_no_constant, "src/io/b.cpp:1: kMax would be that of src/io/a.cpp")
         self.write("src/io/CMakeLists.txt", "covary_module(io\n  SOURCES a.cpp b.cpp)\n")
         self.expect(layers.together_hides_no_constant)
 

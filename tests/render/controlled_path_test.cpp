@@ -256,12 +256,12 @@ TEST(ControlledPath, AsPublishedThereIsNoControlBeforeTheTrainingHasEnded) {
   const ControlSettings published = ControlSettings::published();
   EXPECT_EQ(published.training_spp(), 8u);
   EXPECT_EQ(published.pilot_spp(), 1u);
-  EXPECT_EQ(published.most_clusters(), 5000u);
+  EXPECT_EQ(published.max_clusters(), 5000u);
   ControlSettings of_vevoda = published;
   of_vevoda.kind = ControlKind::kVevoda;
-  EXPECT_EQ(of_vevoda.most_clusters(), 500u) << "as in the authors' program";
+  EXPECT_EQ(of_vevoda.max_clusters(), 500u) << "as in the authors' program";
   of_vevoda.paper = false, of_vevoda.clusters = 256;
-  EXPECT_EQ(of_vevoda.most_clusters(), 256u);
+  EXPECT_EQ(of_vevoda.max_clusters(), 256u);
   EXPECT_LT(difference(image_of_training(published)), 1e-5);
   EXPECT_GT(difference(image_of_training(options(ControlKind::kRgb))), 3e-4);  // solved after each wave
 }

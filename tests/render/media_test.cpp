@@ -223,10 +223,10 @@ TEST(Media, AGridOfOneValueIsHomogeneous) {
 TEST(Media, SingleLengthsAddUpToTheWhole) {
   const std::string body =
       box(medium("0.5", "0.9")) + kSky + wall("<bsdf type='diffuse'><rgb name='reflectance' value='0.5'/></bsdf>");
-  constexpr int kMost = 5;
-  const Film whole = render(load(body, kMost), 4, 3);
+  constexpr int kMax = 5;
+  const Film whole = render(load(body, kMax), 4, 3);
   std::vector<double> sums(32 * 32);
-  for (int depth = 1; depth <= kMost; ++depth) {
+  for (int depth = 1; depth <= kMax; ++depth) {
     const Film part = render(load(body, depth, depth), 4, 3);
     for (int i = 0; i < 1024; ++i) sums[i] += part.mean(i % 32, i / 32).g;
   }

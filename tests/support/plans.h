@@ -35,7 +35,7 @@ inline RenderRequest request_of(uint32_t spp) {
 inline Method average_estimator() {
   Method method;
   method.name = method.text = "average";
-  method.fewest_groups = 3;
+  method.min_groups = 3;
   PassPair pair;
   pair.image = [](const GroupedImage& crn, const GroupedImage& independent, const MethodSettings&) {
     EstimatorResult result;

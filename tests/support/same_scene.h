@@ -12,7 +12,7 @@ namespace covary::test_support {
 inline double difference(const Vec3& a, const Vec3& b) { return length(a - b); }
 
 /// Both scenes have the same hits and BSDF values along a grid of camera rays, and lights of the same power.
-inline void expect_same_scene(const LoadedScene& a, const LoadedScene& b, int least_hits) {
+inline void expect_same_scene(const LoadedScene& a, const LoadedScene& b, int min_hits) {
   ASSERT_EQ(a.width, b.width);
   ASSERT_EQ(a.height, b.height);
   EXPECT_EQ(a.crop_width, b.crop_width);
@@ -44,7 +44,7 @@ inline void expect_same_scene(const LoadedScene& a, const LoadedScene& b, int le
     const Spectrum va = value(ha), vb = value(hb);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(va[c], vb[c], 1e-3f * std::abs(vb[c]) + 1e-5f) << i;
   }
-  EXPECT_GE(hits, least_hits);
+  EXPECT_GE(hits, min_hits);
   ASSERT_EQ(a.scene->emitters().size(), b.scene->emitters().size());
   for (size_t i = 0; i < a.scene->emitters().size(); ++i)
     for (int c = 0; c < 3; ++c)
