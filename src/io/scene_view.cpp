@@ -105,8 +105,8 @@ ObjectPtr sky(const Vec3& up, const Vec3& front, const SourceLocation& where) {
   return make_object("emitter", "sunsky", where,
                      {{"to_world", turned(up, front) * Transform::rotate({1, 0, 0}, -90)},
                       {"sun_direction", sun},
-                      {"sun_scale", 0.03},
-                      {"sky_scale", 0.03}});
+                      {"sun_scale", 3.0},
+                      {"sky_scale", 3.0}});
 }
 
 }  // namespace

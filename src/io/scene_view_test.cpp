@@ -146,6 +146,19 @@ TEST_F(SceneViews, OtherSurroundings) {
   EXPECT_EQ(load(own, {}).content_hash, load(own, {.environment = "auto"}).content_hash);
 }
 
+/// As bright as the other surroundings: a background or an exposure that suits one suits the sky, too.
+TEST_F(SceneViews, AWhiteLevelSurfaceReflectsAboutOneUnderTheSky) {
+  const LoadedScene scene = load(kSensor + kCube, {.environment = "sky"});
+  constexpr int kN = 64;
+  double reflected = 0;
+  for (int i = 0; i < kN * kN * kN; ++i) {
+    const auto at = [](int k) { return (static_cast<float>(k % kN) + 0.5f) / kN; };
+    const EmitterSample s = scene.scene->environment()->sample_towards({}, {at(i), at(i / kN)}, at(i / kN / kN));
+    if (s.pdf_solid_angle > 0) reflected += s.radiance.g * std::max(s.wi.y, 0.0f) / s.pdf_solid_angle / M_PI;
+  }
+  EXPECT_NEAR(reflected / (kN * kN * kN), 1, 0.2);
+}
+
 TEST_F(SceneViews, TheBackgroundShedsNoLight) {
   const LoadedScene scene = load(kSensor + kCube, {.environment = "white", .background = Spectrum(0.1f, 0.2f, 0.4f)});
   ASSERT_TRUE(scene.scene->background());
