@@ -68,6 +68,7 @@ std::vector<std::string> write(const CombineOptions& o, const CombineRequest& re
   for (const char* of_pass : {"covary:sampling", "covary:samples", "covary:device"}) attributes.erase(of_pass);
   attributes["covary:estimator"] = estimator_of(o).text;
   if (o.target && !o.target->made_by().empty()) attributes["covary:device"] = o.target->made_by();
+  if (o.denoising.history.before) attributes[kHistoryAttribute] = o.denoising.history.before->of;
   attributes["covary:version"] = COVARY_VERSION;
   attributes["covary:command"] = command_line();
   const double crn = request.crn ? request.crn->samples : 0, independent = request.independent.samples;

@@ -227,6 +227,7 @@ Denoised denoise_by_mixture(const Options& o, const Task& task, const GroupedFil
   if (!task.picture.channels[0].empty()) result.result.source.picture = task.picture.channels;
   result.result.source.prefix = task.prefix();
   result.attributes = new_attributes(o);
+  if (o.history) result.attributes[kHistoryAttribute] = o.history->of;
   result.attributes["covary:estimator"] = request.estimator.text;
   if (!request.estimator.network.empty()) result.attributes["covary:denoiser"] = request.estimator.network;
   if (file.samples() > 0) result.attributes["covary:samples"] = fmt::to_string(file.samples());

@@ -17,6 +17,7 @@
 #include "core/stopwatch.h"
 #include "declared_options.h"
 #include "film/image_file.h"
+#include "frame_history.h"
 #include "imageio/exr_image.h"
 #include "motion_checks.h"
 #include "numbers.h"
@@ -26,27 +27,6 @@
 
 namespace covary {
 namespace {
-
-MotionSource motion_source(const FrameOptions& o) {
-  MotionSource source = o.motion;
-  if (o.motion_scale.empty()) return source;
-  const std::string_view text = o.motion_scale;
-  const size_t comma = std::min(text.find(','), text.size());
-  const auto x = parse_real(text.substr(0, comma)), y = parse_real(text.substr(std::min(comma + 1, text.size())));
-  if (!x || !y) usage(fmt::format("--motion-scale '{}': expected X,Y, e.g. 1,-1", o.motion_scale));
-  source.scale_x = static_cast<float>(*x), source.scale_y = static_cast<float>(*y);
-  return source;
-}
-
-/// The pattern of the files that contain motion; nullopt if none does, and the user did not name its layer.
-std::optional<std::string> motion_pattern(const MotionSource& source, const FramePatterns& patterns, int frame) {
-  std::vector<std::string> all = patterns.images;
-  all.insert(all.end(), patterns.others.begin(), patterns.others.end());
-  for (const std::string& pattern : all)
-    if (is_frame_pattern_of_input(pattern) && has_motion(frame_name(pattern, frame), source)) return pattern;
-  if (source.motion == MotionSource().motion) return std::nullopt;
-  return patterns.images[0];  // whose layers the error then lists
-}
 
 /// Frames that exist in any of the images, or those asked for.
 std::vector<int> frames_of_all(const FrameOptions& o, const FramePatterns& patterns) {
@@ -214,49 +194,6 @@ void note_gaps(const FrameOptions& o, const std::vector<int>& frames, const Fram
   }
 }
 
-/// The layer whose history is used; none if there are several pictures.
-std::optional<std::string> layer_with_history(const FramePatterns& patterns, int frame) {
-  const std::string path = frame_name(patterns.images[0], frame);
-  const std::vector<ExrFile::Channel> channels = inspect_image(path).channels;
-  const std::vector<Picture> pictures =
-      is_unnamed(patterns.choice) ? find_pictures(channels) : chosen_pictures(path, channels, patterns.choice);
-  if (pictures.size() > 1) return std::nullopt;
-  return pictures.empty() ? "" : pictures[0].layer;
-}
-
-/// What the history of frames is read from.
-struct HistorySource {
-  std::optional<std::string> motion;  ///< pattern of the files with motion; none: there is no history
-  std::string layer;                  ///< of the pictures
-
-  HistorySource(const FrameOptions& o, const FramePatterns& patterns, const std::vector<int>& frames,
-                bool has_history) {
-    if (!has_history || o.no_history || frames.size() < 2) return;
-    const MotionSource source = motion_source(o);
-    motion = motion_pattern(source, patterns, frames[0]);
-    const std::optional<std::string> only = layer_with_history(patterns, frames[0]);
-    if (!motion && !o.quiet)
-      fmt::print(stderr, "note: the frames have no layer '{}' (--motion); each is denoised alone, without history\n",
-                 source.motion);
-    else if (!only && !o.quiet)
-      fmt::print(stderr, "note: the frames have several pictures; each is denoised alone, without history\n");
-    if (!only) motion.reset();
-    layer = only.value_or("");
-  }
-};
-
-std::shared_ptr<const History> history_of(const HistorySource& from, const MotionSource& source,
-                                          const FramePatterns& patterns, int frame) {
-  const std::string before = frame_name(patterns.images[0], frame - 1), now = frame_name(patterns.images[0], frame);
-  const MotionLayers layers = read_motion(frame_name(*from.motion, frame), source);
-  const MotionLayers old = read_motion(frame_name(*from.motion, frame - 1), source);
-  check_seeds(before, now);
-  check_motion(before, now, from.layer, layers);
-  const PlacedImage earlier =
-      read_image(frame_name(patterns.output, frame - 1), from.layer, ChecksumPolicy::kCheck, std::nullopt);
-  return std::make_shared<History>(reproject(earlier.image, old.depth, layers));
-}
-
 /// Runs frames, and remembers what became of them.
 class Frames {
  public:
@@ -270,12 +207,12 @@ class Frames {
 
   /// `which`: "frame 3 (3 of 8)". Returns false if the frame failed.
   bool add(int frame, const std::string& which) {
-    if (o_.resume && is_there(frame)) {
+    const bool has_before = history_.motion && last_ == frame - 1;
+    if (o_.resume && is_there(frame) && !(has_before && is_outdated(frame))) {
       kept_.push_back(frame);
       last_ = frame;
       return true;
     }
-    const bool has_before = history_.motion && last_ == frame - 1;
     const bool is_done = attempt(which, o_.quiet, [&] {
       return run_(frame, has_before ? history_of(history_, source_, patterns_, frame) : nullptr);
     });
@@ -302,6 +239,12 @@ class Frames {
   }
 
  private:
+  bool is_outdated(int frame) const {
+    const std::string why = outdated(patterns_, frame);
+    if (!why.empty() && !o_.quiet) fmt::print(stderr, "note: {}; it is made again\n", why);
+    return !why.empty();
+  }
+
   const FrameOptions& o_;
   const FramePatterns& patterns_;
   const Run& run_;
@@ -316,20 +259,25 @@ class Frames {
 /// Frames of files that a farm is writing.
 class WatchedFrames {
  public:
-  WatchedFrames(const FrameOptions& o, const FramePatterns& patterns) : patterns_(patterns) {
+  WatchedFrames(const FrameOptions& o, const FramePatterns& patterns) : patterns_(patterns), source_(motion_source(o)) {
     if (!o.frames.empty()) wanted_ = frames_of(o.frames, patterns.images[0]);
   }
 
   bool are_all_done() const { return !wanted_.empty() && done_.size() == wanted_.size(); }
 
-  /// The frames that have become ready: all of their files are there and settled.
-  std::vector<int> next() {
+  /// The frames that have become ready: all of their files are there and settled. With `in_order`, frames with motion
+  /// wait for the frame before, which is their history.
+  std::vector<int> next(bool in_order) {
     std::vector<int> ready;
-    for (const int frame : wanted_.empty() ? frames_on_disk(patterns_.images[0]) : wanted_) {
+    const std::vector<int> frames = wanted_.empty() ? frames_on_disk(patterns_.images[0]) : wanted_;
+    for (const int frame : frames) {
       if (done_.contains(frame)) continue;
       size_t n = 0;  // of all files, so that each begins to settle
       for (const std::string& pattern : patterns_.images) n += files_.is_settled(frame_name(pattern, frame));
-      if (n == patterns_.images.size()) done_.insert(frame), ready.push_back(frame);
+      if (n < patterns_.images.size()) continue;
+      const bool follows = std::ranges::find(frames, frame - 1) != frames.end() && !done_.contains(frame - 1);
+      if (in_order && follows && motion_pattern(source_, patterns_, frame)) continue;
+      done_.insert(frame), ready.push_back(frame);
     }
     return ready;
   }
@@ -344,6 +292,7 @@ class WatchedFrames {
 
  private:
   const FramePatterns& patterns_;
+  const MotionSource source_;
   std::vector<int> wanted_;
   std::set<int> done_;
   SettledFiles files_;
@@ -356,15 +305,17 @@ void watch_frames(const FrameOptions& o, const FramePatterns& patterns, bool has
   if (!o.quiet)
     fmt::print(stderr, "waiting for frames '{}'; Ctrl-C{} ends\n", patterns.images[0],
                o.idle ? fmt::format(", or {:g} s without a new frame,", *o.idle) : "");
-  poll(o.idle, [&] {
-    if (watched.are_all_done()) return Found::kEnd;
-    const std::vector<int> ready = watched.next();
+  const auto run_ready = [&](bool in_order) {
+    const std::vector<int> ready = watched.next(in_order);
     for (const int frame : ready) {
       if (!frames) frames.emplace(o, patterns, std::vector{frame, frame + 1}, has_history, run);
       frames->add(frame, fmt::format("frame {}", frame));
     }
     return ready.empty() ? Found::kNothing : Found::kWork;
-  });
+  };
+  const bool in_order = has_history && !o.no_history;
+  poll(o.idle, [&] { return watched.are_all_done() ? Found::kEnd : run_ready(in_order); });
+  if (in_order) run_ready(false);  // those that waited for a frame in vain
   if (!frames) frames.emplace(o, patterns, std::vector<int>(), has_history, run);
   frames->finish(watched.unfinished());
 }

@@ -4,6 +4,7 @@
 #include <system_error>
 
 #include "imageio/exr_image.h"
+#include "plans/made_of.h"
 
 namespace covary {
 
@@ -17,7 +18,7 @@ bool SettledFiles::is_settled(const std::string& path) {
   }
   Seen& seen = seen_.try_emplace(path, found).first->second;
   if (seen.size != found.size || seen.written != found.written) seen = found;
-  return now - seen.since >= kSettled && is_complete_exr(path);
+  return now - seen.since >= kSettled && is_complete_exr(path) && made_file(path).complete;
 }
 
 }  // namespace covary

@@ -31,11 +31,15 @@
 #pragma once
 
 #include <array>
+#include <string>
 #include <vector>
 
 #include "denoising/mixture.h"
 
 namespace covary {
+
+/// Attribute of a result with History::of.
+inline constexpr const char* kHistoryAttribute = "covary:history";
 
 /// Channels of albedo and normal together.
 inline constexpr int kHistoryFeatures = 6;
@@ -49,6 +53,7 @@ struct History {
   /// Albedo and normal of the previous frame, reprojected, 6 channels; and the slopes of its image over them, 18
   /// channels: that of image channel c over feature i is at 3 i + c. Empty if not kept.
   Image features, slopes;
+  std::string of;  ///< identifies the picture of the frame before; "": unknown
 };
 
 /// Adds slopes times the difference of this frame's features from the reprojected ones to a history: at edges and in

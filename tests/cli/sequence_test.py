@@ -352,6 +352,35 @@ class Denoise(SequenceTest):
         self.assertEqual(self.denoise("a_#.exr", "b_#.exr", "-o", "e_#.exr", "--frames", "2-3").returncode, 0)
         self.assertEqual(self.picture("e_2.exr"), self.picture("alone_2.exr"))
 
+    def assert_same_frames(self, one, other):
+        for n in (1, 2, 3):
+            self.assertEqual(self.picture(f"{one}_{n}.exr"), self.picture(f"{other}_{n}.exr"), n)
+
+    def test_resume_makes_frames_again_that_had_no_history(self):
+        inputs = ("a_#.exr", "b_#.exr", "-o")
+        self.assertEqual(self.denoise(*inputs, "whole_#.exr").returncode, 0)
+        for frame in ("1", "3"):
+            self.assertEqual(self.denoise(*inputs, "part_#.exr", "--frames", frame).returncode, 0)
+        said = self.denoise(*inputs, "part_#.exr", "--resume").stderr
+        self.assertIn("'part_3.exr' was made without the frame before, which was missing; it is made again", said)
+        self.assert_same_frames("part", "whole")
+        self.assertIn("0 frames in", self.denoise(*inputs, "part_#.exr", "--resume").stderr)
+
+    def test_frames_that_a_farm_ends_out_of_order_have_their_history(self):
+        inputs = ("a_#.exr", "b_#.exr", "-o")
+        self.assertEqual(self.denoise(*inputs, "all_#.exr").returncode, 0)
+        hidden = self.path / "hidden.exr"
+        (self.path / "a_1.exr").rename(hidden)
+        command = [COVARY, "denoise", *inputs, "watched_#.exr", "--oidn", "off", "--watch", "--frames", "1-3"]
+        process = subprocess.Popen(command, cwd=self.path, stderr=subprocess.DEVNULL)
+        try:
+            time.sleep(4)  # 2 and 3 would be taken by now
+            hidden.rename(self.path / "a_1.exr")
+            self.assertEqual(process.wait(120), 0)
+        finally:
+            process.kill()
+        self.assert_same_frames("watched", "all")
+
     def test_wrong_motion_and_seeds_are_found(self):
         wrong = self.denoise("a_#.exr", "b_#.exr", "-o", "d_#.exr", "--motion-scale=-1,-1")
         self.assertEqual(wrong.returncode, 1)
