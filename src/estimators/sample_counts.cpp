@@ -234,7 +234,7 @@ void ask_for(Settings& parameters, AdaptiveSampling& sampling) {
   static constexpr OptionTraits kPasses{.effect = OptionEffect::kPasses};
   Settings& p = parameters;
   p.whole("dependent-spp", sampling.first_spp, {.low = 1},
-          "First pass's samples; default half, at most 50 (iicv: half)", kPasses);
+          "First pass's samples; default: half of all, of dependent-tests at most 50", kPasses);
   p.whole("max-spp", sampling.counts.max_spp, {.low = 1}, "Maximum samples per pixel in the last pass", kPasses);
 }
 

@@ -376,6 +376,25 @@ LightSource "projection"
   EXPECT_EQ(found.find("mist"), found.rfind("mist"));
 }
 
+TEST_F(Pbrt, TypesWithASimilarNameAreToldFirst) {
+  const std::string found = errors(R"(Camera "perspectiv"
+WorldBegin
+Texture "wood" "spectrum" "imagemop"
+Material "diffuse" "texture reflectance" "wood"
+Shape "sphere"
+Material "dielektric"
+Shape "sphere"
+Shape "sfere"
+)");
+  for (const char* message :
+       {"Camera \"perspectiv\" is not supported; did you mean 'perspective'? Supported: cameras 'orthographic', ",
+        "is not supported; did you mean 'imagemap'? Supported: textures 'bilerp', ",
+        "scene.pbrt:6:1: Material \"dielektric\" is not supported; did you mean 'dielectric' or 'thindielectric'? "
+        "Supported: ",
+        "scene.pbrt:8:1: Shape \"sfere\" is not supported; did you mean 'sphere'? Supported: shapes 'bilinearmesh', "})
+    EXPECT_TRUE(contains(found, message)) << message << "\n" << found;
+}
+
 /// Chains that would overflow the stack, and mixtures of mixtures that would take forever.
 TEST_F(Pbrt, ReferencesToReferencesEnd) {
   const std::string head = "Camera \"perspective\"\nWorldBegin\n";

@@ -150,7 +150,7 @@ void read_pbrt_camera(const std::string& type, PbrtParameters& p, const Transfor
   const bool spherical = type == "spherical" || type == "environment", realistic = type == "realistic";
   view.orthographic = type == "orthographic", view.spherical = spherical;
   if (type != "perspective" && !view.orthographic && !spherical && !realistic) {
-    p.error("is not supported; supported: cameras 'orthographic', 'perspective', 'realistic' and 'spherical'");
+    p.unsupported("cameras 'orthographic', 'perspective', 'realistic' and 'spherical'");
     p.ignore_all();
     return;
   }

@@ -254,8 +254,8 @@ ObjectBuilder make_pbrt_texture(const std::string& type, PbrtParameters& p, cons
     p.ignore_all();
     return nullptr;
   }
-  p.error(
-      "is not supported; supported: textures 'bilerp', 'checkerboard', 'constant', 'directionmix', 'dots', 'fbm', "
+  p.unsupported(
+      "textures 'bilerp', 'checkerboard', 'constant', 'directionmix', 'dots', 'fbm', "
       "'imagemap', 'marble', 'mix', 'scale', 'windy' and 'wrinkled'");
   return nullptr;
 }

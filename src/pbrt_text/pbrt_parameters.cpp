@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
+#include "core/error.h"
 #include "formats/xml_values.h"
 
 namespace covary {
@@ -17,6 +19,17 @@ const std::vector<std::string> kTypes = {"integer", "float",  "point2",  "vector
 
 bool is_one_of(const std::string& text, std::initializer_list<const char*> names) {
   return std::ranges::any_of(names, [&](const char* name) { return text == name; });
+}
+
+/// The words between two of such marks: words_in("one of 'a' and 'b'", '\'') are a and b.
+std::vector<std::string> words_in(std::string_view text, char mark) {
+  std::vector<std::string> words;
+  for (size_t begin = text.find(mark); begin != text.npos; begin = text.find(mark, begin)) {
+    const size_t end = std::min(text.find(mark, begin + 1), text.size());
+    words.emplace_back(text.substr(begin + 1, end - begin - 1));
+    begin = std::min(end + 1, text.size());
+  }
+  return words;
 }
 
 /// Names of older versions.
@@ -200,11 +213,17 @@ void PbrtParameters::warn(const std::string& message) {
   messages_->warn(where_, (kind_.empty() ? what_ : kind_) + " " + message);
 }
 
+void PbrtParameters::unsupported(const std::string& supported) {
+  const std::vector<std::string> type = words_in(what_, '"');
+  const std::string meant = did_you_mean(type.empty() ? "" : type.back(), words_in(supported, '\''));
+  error(fmt::format("is not supported{}{}: {}", meant, meant.empty() ? "; supported" : " Supported", supported));
+}
+
 bool PbrtParameters::unknown(const std::string& supported, const std::string& instead) {
   if (messages_->ignores_unknown())
     warn("is unknown; " + instead);
   else
-    error("is not supported; supported: " + supported);
+    unsupported(supported);
   ignore_all();
   return messages_->ignores_unknown();
 }

@@ -69,8 +69,11 @@ class PbrtParameters {
   /// "parameter 'NAME' of WHAT MESSAGE"
   void error_at(const PbrtParameter& parameter, const std::string& message);
   void warn(const std::string& message);
-  /// A type that nothing here knows: an error that names the supported ones; or, where unknown names are ignored, a
-  /// warning that says what is done instead. Returns whether they are.
+  /// A type that is not among the supported ones, which are in single quotes: an error that names them, and first those
+  /// with a similar name.
+  void unsupported(const std::string& supported);
+  /// The same of a type that nothing here knows; or, where unknown names are ignored, a warning that says what is done
+  /// instead. Returns whether they are.
   bool unknown(const std::string& supported, const std::string& instead);
   /// Marks parameters that have no effect in this renderer as used.
   void ignore(std::initializer_list<const char*> names);

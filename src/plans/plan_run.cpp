@@ -90,7 +90,8 @@ void PlanRun::warn_of_missing_light() const {
 
 void PlanRun::warn_of_other_sampler() const {
   const std::string& type = scene_.sampler_type;
-  const bool is_other = sampler_of(scene_, request_) == Sampler::kSobol && type != "sobol";
+  // `ldsampler` is what a scene with Sobol' points is converted to.
+  const bool is_other = sampler_of(scene_, request_) == Sampler::kSobol && type != "sobol" && type != "ldsampler";
   if (request_.sampler || !callbacks_.warning || !is_other) return;
   callbacks_.warning(fmt::format("the scene's sampler '{}' is rendered as 'sobol' (`sampler`)", type));
 }

@@ -630,8 +630,8 @@ class Pbrt(RenderTest):
         self.bad(2, "scenes of pbrt have no parameters to define", *small, "-o", "d.exr", "-D", "a=1")
 
     def test_mistakes_have_a_place(self):
-        (self.path / "wrong.pbrt").write_text('WorldBegin\nShape "cube"\n')
-        self.bad(1, 'wrong.pbrt:2:1: Shape "cube" is not supported; supported: shapes', "render", "wrong.pbrt", "-o",
+        (self.path / "wrong.pbrt").write_text('WorldBegin\nShape "teapot"\n')
+        self.bad(1, 'wrong.pbrt:2:1: Shape "teapot" is not supported; supported: shapes', "render", "wrong.pbrt", "-o",
                  "a.exr")
 
 

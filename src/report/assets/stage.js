@@ -49,7 +49,8 @@ function draw_waiting(context, pane, failure) {
   context.fillStyle = "#c9ccd1";
   context.font = LABEL_FONT;
   context.textAlign = "center";
-  context.fillText(failure ?? "Decoding …", pane.clip.x + pane.clip.w / 2, pane.clip.y + pane.clip.h / 2);
+  const { x, y, w, h } = pane.clip;
+  context.fillText(failure ?? "Decoding …", x + w / 2, y + h / 2, Math.max(w - 24, 1));
   return Boolean(failure);
 }
 
