@@ -117,32 +117,57 @@ def estimators_module(estimators):
     return "\n".join([head, f"__all__ = {names!r}", "", *types, *(f"\n\n{estimator_function(e)}" for e in pairs), ""])
 
 
-def arguments_of_render(source):
+def keywords_of_render(source):
+    """The arguments of render() that have to be named, with their types."""
     functions = [node for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)]
     render = next(function for function in functions if function.name == "render")
-    under_other_names = {"no_preview", "resolution", "rfilter"}
-    return {argument.arg for argument in (*render.args.args, *render.args.kwonlyargs)} | under_other_names
+    return {argument.arg: ast.unparse(argument.annotation) for argument in render.args.kwonlyargs}
 
 
 #: Types of arguments that several functions have, and the options whose choices they are.
 NAMED_CHOICES = {"DenoiseMode": "denoise", "Filter": "rfilter"}
 
 
-def keywords_module(lists, own):
-    """For type checkers: the keywords that render() takes as declared options, besides its own arguments."""
-    types = {}
-    for option in (option for options in lists for option in options):
-        types.setdefault(identifier(option["name"]), set()).update(type_and_default(option)[0].split(" | "))
-    def ordered(kinds):
-        return " | ".join(sorted(kinds, key=lambda kind: (kind == "None", kind)))
+#: Options of render() that are arguments under another name, or of Scene.load().
+UNDER_OTHER_NAMES = {"estimator", "spp", "no_preview", "rfilter", "resolution", "background", "camera",
+                     "environment"}
+#: What functions take for the image of rendered samples, besides the estimator's options.
+OF_THE_IMAGE = {"denoise": "DenoiseMode | None", "oidn": "str | PathLike[str]", "force": "bool",
+                "std_error": "bool | None"}
 
-    lines = "\n".join(wrapped(f"{name}: {ordered(kinds)}", "    ") for name, kinds in sorted(types.items())
-                      if name not in own)
+
+def types_of(options):
+    """Types of keywords by name; one name may be an option of several estimators."""
+    types = {}
+    for option in options:
+        types.setdefault(identifier(option["name"]), set()).update(type_and_default(option)[0].split(" | "))
+    return {name: " | ".join(sorted(kinds, key=lambda kind: (kind == "None", kind)))
+            for name, kinds in sorted(types.items())}
+
+
+def typed_dict(name, about, types, base="TypedDict"):
+    lines = "\n".join(wrapped(f"{keyword}: {kind}", "    ") for keyword, kind in types.items())
+    return f'class {name}({base}, total=False):\n    """{about}"""\n\n{lines}\n'
+
+
+def keywords_module(render_options, estimators, own):
+    """For type checkers: the keywords that functions take as declared options, besides their own arguments."""
+    pairs = [option for estimator in estimators if estimator["passes"] == "pair"
+             for option in combine_options(estimator)]
+    every = [*render_options, *(option for estimator in estimators for option in estimator["options"])]
+    of_render = {name: kind for name, kind in types_of(every).items() if name not in {*own, *UNDER_OTHER_NAMES}}
     head = HEAD.format("Keywords of functions that take options.", ", Literal, TypedDict",
-                       "if TYPE_CHECKING:\n    from os import PathLike\n\n")
-    choices = {option["name"]: option["choices"] for options in lists for option in options}
+                       "if TYPE_CHECKING:\n    from os import PathLike\n\n"
+                       "    from .progress import RenderProgress\n")
+    choices = {option["name"]: option["choices"] for option in every}
     names = "".join(f"{name} = {literal(choices[option])}\n" for name, option in NAMED_CHOICES.items())
-    return f"{head.replace(' Any,', '')}{names}\n\nclass RenderOptions(TypedDict, total=False):\n{lines}\n"
+    classes = [
+        typed_dict("EstimatorOptions", "Of estimators of two images, for combine().", types_of(pairs)),
+        typed_dict("ImageOptions", "Of the image that functions make of what other programs render.", OF_THE_IMAGE,
+                   "EstimatorOptions"),
+        typed_dict("RenderOptions", "Of render(), besides its arguments.", of_render),
+        typed_dict("RenderArguments", "All that render() takes by name.", own, "RenderOptions")]
+    return "\n\n".join([f"{head.replace(' Any,', '')}{names}", *classes])
 
 
 METRIC = '''
@@ -181,8 +206,8 @@ def main():
     estimators = module.estimators()
     (package / "estimators.py").write_text(estimators_module(estimators))
     (package / "_keywords.py").write_text(
-        keywords_module([module.render_options(), *(estimator["options"] for estimator in estimators)],
-                        arguments_of_render((package / "_render.py").read_text())))
+        keywords_module(module.render_options(), estimators,
+                        keywords_of_render((package / "_render.py").read_text())))
     (package / "metrics.py").write_text(metrics_module(module.metrics()))
     (package / "_covary.pyi").write_text(stub_of(module))
 

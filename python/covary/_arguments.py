@@ -282,8 +282,12 @@ def checked(declared: Mapping[str, Rule] | None = None, /, **rules: Rule) -> Cal
         def call(*arguments: P.args, **keywords: P.kwargs) -> R:
             try:
                 bound = signature.bind(*arguments, **keywords)
-            except TypeError:  # Python's own message, which names the function
-                return called(*arguments, **keywords)
+            except TypeError:
+                bound = None
+            if bound is None:
+                takes_more = any(parameter.kind is parameter.VAR_KEYWORD for parameter in signature.parameters.values())
+                check_names([] if takes_more else set(keywords) - set(named), named)
+                return called(*arguments, **keywords)  # Python's own message, which names the function
             for given, known in ((bound.arguments, rules), (bound.arguments.get("options", {}) if more else {}, more)):
                 given.update({name: rule(name, given[name]) for name, rule in known.items() if name in given})
             return called(*bound.args, **bound.kwargs)

@@ -12,13 +12,15 @@ from ._arguments import (
     Rule, array, check_names, check_some, checked, either, empty_or, flag, function, mapping_of, optional, path, text,
     whole,
 )
-from ._options import DEFAULT, DEFAULT_OF_PAIRS, OptionValue, check_no_passes, declared_rules, text_options
+from ._options import DEFAULT, DEFAULT_OF_PAIRS, check_no_passes, declared_rules, text_options
 from ._result import Result
 from .errors import InputError, UsageError, _warn
 from .progress import Progress, steps
 
 if TYPE_CHECKING:
-    from ._keywords import DenoiseMode
+    from typing_extensions import Unpack
+
+    from ._keywords import DenoiseMode, EstimatorOptions
     from .estimators import PairEstimator
     from .film import Film
 
@@ -39,7 +41,7 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, l
             normal: Any = None, denoising_albedo: Any = None, denoising_normal: Any = None, position: Any = None,
             layers: Mapping[str, Any] | None = None, oidn: str | PathLike[str] = "", device: str = "cpu",
             std_error: bool | None = None, force: bool = False, progress: Progress | None = None,
-            **options: OptionValue) -> Result:
+            **options: Unpack[EstimatorOptions]) -> Result:
     """Combines `crn`, whose pixels share their random numbers, and `independent`, whose pixels do not, into one image.
 
     Each is a float32 array [T, H, W, 3], the means of T groups of samples (renders with different seeds), from NumPy,
@@ -81,10 +83,14 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, l
     check_no_passes(options, "here are images that are rendered: counts= tells the samples that their pixels have")
     if estimator == DEFAULT and options:
         estimator = DEFAULT_OF_PAIRS  # type: ignore[assignment]  # whose options they are
-    made = _covary.combine(crn, independent, None if counts is None else _counts(counts), light, albedo,
-                           normal, denoising_albedo, denoising_normal, position, dict(layers or {}), estimator,
-                           text_options(options, estimator), denoise or "", fspath(oidn), device, force, std_error,
-                           samples, steps(progress, "combining", shown=False))
+    texts = text_options(options, estimator)
+    try:
+        made = _covary.combine(crn, independent, None if counts is None else _counts(counts), light, albedo, normal,
+                               denoising_albedo, denoising_normal, position, dict(layers or {}), estimator, texts,
+                               denoise or "", fspath(oidn), device, force, std_error, samples,
+                               steps(progress, "combining", shown=False))
+    except InputError as error:
+        raise InputError(f"{error}{_how_read(crn=crn, independent=independent)}") from None
     for text in found + made["warnings"]:
         _warn(text)
     return Result(**made | {"warnings": found + made["warnings"]})
@@ -105,6 +111,17 @@ def _alone(independent: Any, counts: Any, samples: int | None) -> tuple[Any, int
 
 #: No image has more groups than this and fewer columns; arrays that seem to are [H, W, T, 3].
 _MANY_GROUPS, _FEW_COLUMNS = 64, 32
+
+
+def _how_read(**images: Any) -> str:
+    """For errors about arrays whose groups may be last: how their shapes were read. "" for others."""
+    texts = []
+    for name, image in images.items():
+        shape = tuple(getattr(image, "shape", ()))
+        if len(shape) == 4 and shape[2] < min(shape[:2]):
+            texts.append(f"; {name}: the shape {list(shape)} was read as [T, H, W, 3], {shape[0]} groups of "
+                         f"{shape[2]} x {shape[1]} pixels, so that arrays [H, W, T, 3] need .transpose(2, 0, 1, 3)")
+    return texts[0] if texts else ""
 
 
 def _groups_first(name: str, image: Any, found: list[str]) -> Any:

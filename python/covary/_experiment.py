@@ -16,12 +16,13 @@ from pathlib import Path
 from typing import Any
 
 from . import _covary
-from ._arguments import checked, function, list_of, optional, path, text
+from ._arguments import checked, list_of, path, text
 from ._cluster import CLIENT, SceneFiles, check_versions, dask, make_plugin, results
+from ._combine import PROGRESS
 from ._program import failure, program, run_program
 from ._render import Scene
 from .errors import Error, UsageError
-from .progress import Counted
+from .progress import Counted, Progress, steps
 
 
 @dataclass(frozen=True)
@@ -127,15 +128,16 @@ def _make_runs(client: Any, pieces: Sequence[_Piece], cache: Path, program_hash:
 
 
 @checked(client=CLIENT, suite=path, output=path, arguments=list_of(text, "a list of texts"),
-         progress=optional(function))
+         progress=PROGRESS)
 def experiment(client: Any, suite: str | os.PathLike[str], output: str | os.PathLike[str],
-               arguments: Sequence[str] = (), *, progress: Counted | None = None) -> Path:
+               arguments: Sequence[str] = (), *, progress: Progress | None = None) -> Path:
     """`covary experiment SUITE -o OUTPUT ARGUMENTS…` with its runs on the workers of a dask.distributed.Client.
     Returns the path of the report. Cached runs are not repeated, so the same call continues after an interruption.
 
     suite: a file (JSON, or a scene in XML) or the name of a built-in suite.
     arguments: further options of the command, e.g. ["--quick", "--scenes", "scenes"]; --threads is that of each run.
-    progress: called with (done, total) parts.
+    progress: True for a line of text, the default on a terminal and in notebooks; False for none; or a function, called
+        with (done, total) parts.
 
     Raises UsageError and Error with the messages of the command.
     """
@@ -153,7 +155,7 @@ def experiment(client: Any, suite: str | os.PathLike[str], output: str | os.Path
     folder = known.scenes or _covary.scenes_folder(json.dumps(printed), os.fspath(suite), str(program()))
     pieces = list(_pieces(client, printed, Path(folder), options))
     cache = Path(known.cache or Path(output) / "cache")
-    _make_runs(client, pieces, cache, program_hash, progress)
+    _make_runs(client, pieces, cache, program_hash, steps(progress, "parts"))
     _ask(suite, *arguments, "-o", output, "--quiet")
     return Path(output) / "report.html"
 

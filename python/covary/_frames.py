@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from . import _covary
-from ._arguments import checked, function, list_of, optional, path, text, whole
+from ._arguments import checked, list_of, path, text, whole
 from ._cluster import CLIENT, check_versions, results
+from ._combine import PROGRESS
 from ._program import failure, program
 from .errors import UsageError
-from .progress import Counted
+from .progress import Progress, steps
 
 
 def _render_frame(words: tuple[str, ...], folder: str) -> tuple[int, str]:
@@ -46,10 +47,10 @@ def _path(name: str, frame: int) -> Path:
 
 @checked(client=CLIENT, scene=path, output=path, first=whole(0, 999999), last=whole(0, 999999),
          options=list_of(text, "a list of texts"), waves=whole(1, 1000), seed=whole(0, 999999),
-         progress=optional(function))
+         progress=PROGRESS)
 def frames(client: Any, scene: str | os.PathLike[str], output: str | os.PathLike[str], first: int, last: int,
            options: Sequence[str] = (), *, waves: int = 1, seed: int = 0,
-           progress: Counted | None = None) -> list[Path]:
+           progress: Progress | None = None) -> list[Path]:
     """`covary render SCENE -o OUTPUT --frames FIRST-LAST OPTIONS…` with each frame on a worker of a
     dask.distributed.Client, in this process's folder, which all machines must share. Returns the paths of
     the frames, which have the bits of one machine. Frames that are complete are not rendered again, so that the same
@@ -60,7 +61,8 @@ def frames(client: Any, scene: str | os.PathLike[str], output: str | os.PathLike
         because it makes each frame depend on the one before; use `covary denoise` on the frames afterwards.
     waves: number of tasks per frame, each with the samples that the options name. Task k has the seed `seed` + k - 1
         and writes OUTPUT with "-k" before its extension; `covary denoise` takes them all, without --groups.
-    progress: called with (done, total) tasks.
+    progress: True for a line of text, the default on a terminal and in notebooks; False for none; or a function, called
+        with (done, total) tasks.
 
     Raises UsageError and Error with the messages of the command.
     """
@@ -74,9 +76,10 @@ def frames(client: Any, scene: str | os.PathLike[str], output: str | os.PathLike
     folder, parts = os.getcwd(), _waves(os.fspath(output), options, waves, seed)
     tasks = [(frame, (_words(os.fspath(scene), name, frame, words), folder))
              for frame in numbers for name, words in parts]
+    shown = steps(progress, "frames" if waves == 1 else "tasks")
     for done, (frame, (code, errors)) in enumerate(results(client, _render_frame, tasks), 1):
         if code != 0:
             raise failure(code, f"frame {frame}: {errors.strip().removeprefix('covary: ')}")
-        if progress is not None:
-            progress(done, len(tasks))
+        if shown is not None:
+            shown(done, len(tasks))
     return [_path(name, frame) for frame in numbers for name, _ in parts]

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 _CALL = Path(__file__).with_name("_call.py")
 _SOCKET = "COVARY_METHODS"
+_MOST_TICKS = 6
 
 
 @dataclass(frozen=True)
@@ -127,6 +128,10 @@ class Experiment:
         for name, points in lines.items():
             axes.plot(*zip(*sorted(points), strict=True), marker="o", label=name)
         axes.set(xscale="log", yscale="log", xlabel="samples per pixel", ylabel="relMSE")
+        counts = sorted({x for points in lines.values() for x, _ in points})
+        if 0 < len(counts) <= _MOST_TICKS:
+            axes.set_xticks(counts, [f"{count:g}" for count in counts])
+            axes.set_xticks([], minor=True)
         axes.legend()
         return axes
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterable, Mapping
 from os import PathLike, fspath
-from typing import Any, Union
+from typing import Any
 
 from . import _covary
 from ._arguments import Rule, choice, flag, optional, path, real, scalar, text, whole
 from .errors import UsageError
-
-OptionValue = Union[bool, int, float, str, None]
 
 
 @functools.cache
@@ -63,7 +61,7 @@ def declared_rules(options: Iterable[dict[str, Any]]) -> dict[str, Rule]:
     return {underscored(option["name"]): rule_of(option) for option in options}
 
 
-def text_options(options: Mapping[str, OptionValue], estimator: str) -> dict[str, str]:
+def text_options(options: Mapping[str, object], estimator: str) -> dict[str, str]:
     """`paper=True, k=9` as {"paper": "", "k": "9"}; None and False are left out, as defaults. Raises
     TypeError and UsageError for values that are not of the option's type; the registry does so for those out of range
     and for names that it does not know."""

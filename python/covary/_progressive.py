@@ -15,11 +15,15 @@ from .progress import _phases
 if TYPE_CHECKING:
     import numpy
     from numpy.typing import NDArray
+    from typing_extensions import Unpack
+
+    from ._keywords import RenderArguments
+    from .estimators import Estimator
 
     FloatArray = NDArray[numpy.float32]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Step:
     """An image on the way, and what is known of its error.
 
@@ -86,8 +90,8 @@ class _Watcher:
 
 
 @checked(scene=SCENE, spp=optional(SPP), estimator=optional(text))
-def render_progressively(scene: PathOrScene, spp: int | None = None, estimator: Any = None,
-                         **arguments: Any) -> Iterator[Step]:
+def render_progressively(scene: PathOrScene, spp: int | None = None, estimator: Estimator | None = None,
+                         **arguments: Unpack[RenderArguments]) -> Iterator[Step]:
     """Renders as render() does, with its arguments and to the same bits, and yields images on the way:
 
         for step in covary.render_progressively("room", until=1e-3):
@@ -96,11 +100,12 @@ def render_progressively(scene: PathOrScene, spp: int | None = None, estimator: 
     Steps come when they cost little, first often and then more rarely, and the last one has the `result`. Leaving the
     loop ends the render. Raises what render() raises.
     """
-    watcher = _Watcher(arguments.pop("progress", None))
+    keywords: dict[str, Any] = dict(arguments)
+    watcher = _Watcher(keywords.pop("progress", None))
 
     def run() -> None:
         try:
-            result = render(scene, spp, estimator, progress=watcher, **arguments)
+            result = render(scene, spp, estimator, progress=watcher, **keywords)
             watcher.put(Step(result.image, result.std_error, result.samples_per_pixel or 0.0, result.predicted_relmse,
                              result.predicted_bounds, result))
         except BaseException as error:  # noqa: BLE001  raised again in the caller's thread

@@ -27,7 +27,7 @@ def new_axes() -> Any:
         from matplotlib import pyplot  # type: ignore[import-not-found,import-untyped,unused-ignore]
     except ImportError as error:
         raise ImportError("plot() needs matplotlib: pip install matplotlib") from error
-    return pyplot.subplots()[1]
+    return pyplot.subplots(layout="constrained")[1]
 
 
 def relmse_text(value: float | None, bounds: tuple[float, float] | None) -> str:
@@ -37,7 +37,7 @@ def relmse_text(value: float | None, bounds: tuple[float, float] | None) -> str:
     return f"predicted relMSE {value:.3g}" + (f" ({bounds[0]:.2g} to {bounds[1]:.2g})" if bounds else "")
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Result:
     """An image and what is known of its error. Its repr() is one line; in notebooks it shows the image.
 
@@ -168,7 +168,7 @@ def text_of_bad_samples(not_finite: int, negative: int, samples: list[BadSample]
     return "\n".join([*lines, *(f"  {sample}\n    {sample.replay}" for sample in samples)])
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class RenderResult(Result):
     """The result of a render.
 

@@ -12,21 +12,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _covary, _cycles
-from ._arguments import checked, flag, function, instance, optional, text, whole
-from ._combine import check_options, combine
+from ._arguments import checked, flag, instance, optional, text, whole
+from ._combine import PROGRESS, check_options, combine
 from ._cycles import Group
-from ._options import DEFAULT, OptionValue
+from ._options import DEFAULT
 from ._render import SEED, SPP
 from ._result import Result, fields_of
 from .errors import UsageError
 from .film import Film, film_from_groups
-from .progress import Counted
+from .progress import Counted, Progress, steps
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._keywords import ImageOptions
     from .estimators import PairEstimator
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class BlenderResult(Result):
     """The result of render()."""
 
@@ -65,9 +68,9 @@ _SCENE = optional(instance("a bpy.types.Scene", lambda value: hasattr(value, "cy
 
 
 @checked(scene=_SCENE, spp=SPP, seed=SEED, groups=whole(3, _covary.most_groups), estimator=text, change=flag,
-         progress=optional(function))
+         progress=PROGRESS)
 def render(scene: Any = None, spp: int = 192, seed: int = 0, *, groups: int = 12, estimator: PairEstimator = DEFAULT,
-           change: bool = True, progress: Counted | None = None, **options: OptionValue) -> BlenderResult:
+           change: bool = True, progress: Progress | None = None, **options: Unpack[ImageOptions]) -> BlenderResult:
     """Renders a Blender scene with Cycles and takes its noise out. By default all samples are independent, and the
     image is made as by covary.render(), guided by Cycles' albedo and normal; for estimators of two images, half of the
     samples have common random numbers. Afterwards, all settings of the scene are restored.
@@ -77,7 +80,8 @@ def render(scene: Any = None, spp: int = 192, seed: int = 0, *, groups: int = 12
     seed: different seeds give different samples.
     change: render even if settings of the scene must be changed in a way that affects the picture (clamping, the
         denoiser, …), and say so in `warnings`; otherwise raise UsageError.
-    progress: called with (done, total) groups.
+    progress: True for a line of text, the default on a terminal and in notebooks; False for none; or a function, called
+        with (done, total) groups.
     """
     check_options(estimator, options)
     bpy = _cycles.blender()
@@ -89,7 +93,7 @@ def render(scene: Any = None, spp: int = 192, seed: int = 0, *, groups: int = 12
         raise UsageError(f"settings that cannot stay: {'; '.join(changed)}")
     started = time.perf_counter()
     images = _collect(_images(bpy, scene, _cycles.groups_of(spp, groups, seed, kinds)),
-                      len(kinds) * groups, progress)
+                      len(kinds) * groups, steps(progress, "groups"))
     return _combined(images, spp, estimator, options, changed, time.perf_counter() - started)
 
 
@@ -103,7 +107,7 @@ def _collect(groups: Iterator[dict[str, Any]], total: int, progress: Counted | N
     return images
 
 
-def _combined(images: dict[str, list[Any]], spp: int, estimator: str, options: dict[str, OptionValue],
+def _combined(images: dict[str, list[Any]], spp: int, estimator: str, options: ImageOptions,
               changed: list[str], seconds: float) -> BlenderResult:
     import numpy
 

@@ -21,19 +21,22 @@ from typing import TYPE_CHECKING, Any
 from . import _covary
 from ._arguments import array, check_some, checked, function, mapping_of, optional, path, real, text, whole
 from ._cluster import CLIENT, SceneFiles, check_versions, dask, make_plugin, results
-from ._combine import check_options, combine, features_of
+from ._combine import PROGRESS, check_options, combine, features_of
 from ._experiment import experiment, main
 from ._frames import frames
-from ._options import DEFAULT, OptionValue, check_no_passes, estimators_of_films, option_texts, passes_of
+from ._options import DEFAULT, check_no_passes, estimators_of_films, option_texts, passes_of
 from ._parts import Part, PartFolder, Rendered
 from ._render import SCENE, SEED, SPP, Scene, report_bad_samples
 from ._render import render as render_here
 from ._result import BadSample, RenderResult, Result, fields_of
 from .errors import Error, InputError, IoError, UsageError
 from .film import Film, merge_films
-from .progress import Counted
+from .progress import Progress, steps
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._keywords import ImageOptions
     from ._result import FloatArray
     from .estimators import Estimator
 
@@ -156,7 +159,7 @@ class _Canvas:
         return (total / numpy.maximum(samples, 1)).astype(numpy.float32)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class ClusterResult(Result):
     """The result of render()."""
 
@@ -219,13 +222,13 @@ def _plan(scene: Scene, spp: int, estimator: str | None, seed: int, sample_range
 
 
 @checked(client=CLIENT, scene=SCENE, spp=SPP, estimator=optional(text), seed=SEED, sample_ranges=whole(1, 1 << 20),
-         tile=whole(1, 65536), folder=optional(path), progress=optional(function), on_image=optional(function),
+         tile=whole(1, 65536), folder=optional(path), progress=PROGRESS, on_image=optional(function),
          image_seconds=real(0), settings=optional(mapping_of(array, "a mapping from keywords of covary.render()")))
 def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimator: Estimator | None = None, *,
            seed: int = 0, sample_ranges: int = 1, tile: int = 128, folder: str | os.PathLike[str] | None = None,
-           progress: Counted | None = None, on_image: Callable[[FloatArray], object] | None = None,
+           progress: Progress | None = None, on_image: Callable[[FloatArray], object] | None = None,
            image_seconds: float = 5.0, settings: Mapping[str, Any] | None = None,
-           **options: OptionValue) -> ClusterResult:
+           **options: Unpack[ImageOptions]) -> ClusterResult:
     """Renders on the workers of a dask.distributed.Client.
 
     spp: samples per pixel of all passes and ranges together.
@@ -236,7 +239,8 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     tile: side of a tile, in pixels.
     folder: where this machine saves each part as it arrives; a later render with the same scene and settings uses what
         is there, even if this process has died.
-    progress: called with (done, total) parts.
+    progress: True for a line of text, the default on a terminal and in notebooks; False for none; or a function, called
+        with (done, total) parts.
     on_image: called with the mean of all samples so far, at most every `image_seconds`.
     settings: further keywords of covary.render() for the passes: filter, sampling, sampler, groups, split.
     options: of the estimator, and denoise and oidn, whose features are rendered, too.
@@ -256,11 +260,12 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     job = _Job(files.folder, files.file, chosen.path, chosen._loading, plan.settings)
     canvas = _Canvas(*chosen.resolution)
     last_image = started = time.monotonic()
+    shown = steps(progress, "parts")
 
     def show() -> None:
         nonlocal last_image
-        if progress is not None:
-            progress(len(canvas.parts), len(plan.parts))
+        if shown is not None:
+            shown(len(canvas.parts), len(plan.parts))
         if on_image is not None and time.monotonic() - last_image >= image_seconds:
             on_image(canvas.image())
             last_image = time.monotonic()

@@ -7,17 +7,20 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from ._arguments import checked, either, flag, function, instance, optional, path, text, whole
-from ._combine import check_options, combine, features_of
+from ._arguments import checked, either, flag, instance, optional, path, text, whole
+from ._combine import PROGRESS, check_options, combine, features_of
 from ._covary import most_groups
-from ._options import DEFAULT, OptionValue
+from ._options import DEFAULT
 from ._render import SEED, SPP
 from ._result import Result, fields_of
 from .errors import UsageError
 from .film import Film, film_from_groups
-from .progress import Counted
+from .progress import Progress, steps
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._keywords import ImageOptions
     from ._result import FloatArray
     from .estimators import PairEstimator
 
@@ -32,7 +35,7 @@ _GUIDES = ("Albedo", "N", "DenoisingAlbedo", "DenoisingNormal")
 _defined: dict[str, None] = {}
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class MitsubaResult(Result):
     """The result of render()."""
 
@@ -271,10 +274,10 @@ _INTEGRATOR = optional(instance("an Integrator of Mitsuba, its name, or a dictio
 
 
 @checked(scene=_SCENE, spp=SPP, seed=SEED, integrator=_INTEGRATOR, sensor=whole(0), groups=whole(3, most_groups),
-         estimator=text, aovs=flag, progress=optional(function))
+         estimator=text, aovs=flag, progress=PROGRESS)
 def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: int = 0, *, groups: int = 12,
-           estimator: PairEstimator = DEFAULT, aovs: bool = False, progress: Counted | None = None,
-           **options: OptionValue) -> MitsubaResult:
+           estimator: PairEstimator = DEFAULT, aovs: bool = False, progress: Progress | None = None,
+           **options: Unpack[ImageOptions]) -> MitsubaResult:
     """Renders a scene with Mitsuba and takes its noise out. By default all samples are independent, and the image is
     made as by covary.render(); for estimators of two images, half of the samples have common random numbers.
 
@@ -286,7 +289,8 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
     groups: number of groups of samples in each image; fewer if there are fewer samples.
     aovs: also render albedo and shading normals, "Albedo" and "N", and those seen in mirrors and through glass,
         "DenoisingAlbedo" and "DenoisingNormal". Where the image is denoised they are always rendered, and guide it.
-    progress: called with (done, total) groups.
+    progress: True for a line of text, the default on a terminal and in notebooks; False for none; or a function, called
+        with (done, total) groups.
     options: of the estimator.
 
     The film's filter is replaced by a box, and a sampler other than `independent` by that one, with warnings. As many
@@ -314,12 +318,13 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
     started = time.perf_counter()
     total = len(kinds) * groups
     done = 0
+    shown = steps(progress, "groups")
 
     def finished(number: int) -> None:
         nonlocal done
         done += number
-        if progress is not None:
-            progress(done, total)
+        if shown is not None:
+            shown(done, total)
 
     films = {name: _film(mi, loaded, camera, chosen, name, count, groups, seed, finished)
              for name in kinds}

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """covary.distributed on clusters of this machine: the bits of one machine, with workers that die, and without the files
 of the scene."""
+import contextlib
+import io
 import json
 import os
 import pickle
@@ -179,6 +181,13 @@ class Cluster(PackageTest):
         self.assertEqual((seen[-1], there.parts, there.samples_per_pixel), ((12, 12), 12, 24))
         for name in ("crn", "independent"):
             self.assert_same_bits(here.films[name].groups, there.films[name].groups)
+
+    def test_progress(self):
+        """True writes lines, as in covary.render()."""
+        shown = io.StringIO()
+        with contextlib.redirect_stderr(shown):
+            covary.distributed.render(self.client, self.scene(), 24, "iicv", tile=40, progress=True)
+        self.assertIn("parts: 3 of 4\nparts: 4 of 4\n", shown.getvalue())
 
     def test_threads_of_workers(self):
         self.assertEqual(set(self.client.run(covary.set_threads, 1).values()), {None})

@@ -139,6 +139,10 @@ class Images(PackageTest):
         covary.combine(*pair()).save(self.path / "b.png")
         self.assertEqual(covary.read_image(self.path / "b.png").shape, (HEIGHT, WIDTH, 3))
 
+    def test_results_are_compared_as_objects(self):
+        one, two = (covary.combine(*pair()) for _ in range(2))
+        self.assertEqual(([one, two].index(two), len({one, two})), (1, 2))
+
     def test_errors(self):
         missing = str(self.path / "missing.exr")
         message = self.message_of(OSError, covary.read_image, missing)

@@ -139,12 +139,16 @@ class Experiments(PackageTest):
                 self.lines.append((x, style["label"]))
             def set(self, **words):
                 self.words = words
+            def set_xticks(self, places, labels=(), minor=False):
+                if not minor:
+                    self.ticks = places, labels
             def legend(self):
                 pass
             imshow = None
 
         axes = self.experiment().plot(Axes())
         self.assertEqual((axes.lines, axes.words["yscale"]), ([((16.0,), "room, pt")], "log"))
+        self.assertEqual(axes.ticks, ([16.0], ["16"]))
 
     def test_failures(self):
         def wrong(samples):

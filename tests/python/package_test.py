@@ -50,6 +50,9 @@ class Import(PackageTest):
 
 GOOD = """
 import covary
+import covary.blender
+import covary.distributed
+import covary.mitsuba
 import numpy
 from numpy.typing import NDArray
 a: NDArray[numpy.float32] = numpy.zeros((3, 4, 4, 3), numpy.float32)
@@ -57,12 +60,29 @@ image: NDArray[numpy.float32] = covary.iicv(a, a, k=9, penalty="sample").image
 covary.combine(a, a, "cv-baseline")
 error: float = covary.metrics.flip(image, image)
 covary.render(covary.Scene.load("x.xml"), 4, "none", filter="box").films["independent"].save("x")
+covary.combine(a, a, k=9, penalty="sample", paper=True)
+for step in covary.render_progressively("x.xml", until=1e-3, sampler="sobol", progress=False):
+    print(step.samples_per_pixel)
+covary.mitsuba.render("x.xml", 64, denoise="bias", oidn="off", progress=True)
+covary.blender.render(None, 64, estimator="iicv", window=7)
+covary.distributed.render(None, "x.xml", 64, denoise="none", progress=print)
 """
 WRONG = {
     'covary.iicv(a, a, penalty="smple")': "arg-type",
     "covary.iicv(a, a, windw=3)": "call-arg",
     'covary.combine(a, a, "polynomials")': "arg-type",
     'covary.render("x.xml", filter="bx")': "arg-type",
+    'covary.render("x.xml", smapler="sobol")': "call-arg",
+    'covary.render("x.xml", max_spp="64")': "arg-type",
+    'covary.render("x.xml", camera="2")': "call-arg",  # of Scene.load()
+    'covary.render_frames("x_#.xml", "o_#.exr", "1-2", aov=True)': "call-arg",
+    "covary.combine(a, a, widow=7)": "call-arg",
+    'covary.combine(a, a, k="9")': "arg-type",
+    'covary.render_progressively("x.xml", untl=1e-3)': "call-arg",
+    'covary.mitsuba.render("x.xml", 64, denois="bias")': "call-arg",
+    'covary.mitsuba.render("x.xml", 64, denoise="biased")': "arg-type",
+    'covary.blender.render(None, 64, penalty="smple")': "arg-type",
+    'covary.distributed.render(None, "x.xml", 64, windw=7)': "call-arg",
 }
 
 

@@ -76,6 +76,21 @@ class Refusals(PackageTest):
                       self.message_of(covary.InputError, covary.merge_films, films))
         self.assertIn("; did you mean 'iicv'?", self.message_of(covary.UsageError, covary.render, "room", 4, "icv"))
 
+    def test_arguments_that_are_missing_or_misspelt(self):
+        self.assertIn("smal: there is no such argument; did you mean small?",
+                      self.message_of(covary.UsageError, covary.view, CRN[0], smal=True))
+        with self.assertRaisesRegex(TypeError, r"missing 1 required positional argument: 'samples'") as raised:
+            covary.film_from_groups(CRN)
+        self.assertIsNone(raised.exception.__context__)
+
+    def test_axes_in_the_wrong_order(self):
+        """Of small arrays, whose order cannot be told: an error says how they were read."""
+        last = [numpy.ascontiguousarray(image.transpose(1, 2, 0, 3)) for image in (CRN, INDEPENDENT)]
+        message = self.message_of(covary.InputError, covary.combine, *last)
+        height, width, groups, _ = last[0].shape
+        shape = list(last[0].shape)
+        self.assertIn(f"the shape {shape} was read as [T, H, W, 3], {height} groups of {groups} x {width} pix", message)
+
     def test_warnings(self):
         """Are issued where the caller is, and kept."""
         turned = numpy.zeros((80, 70, 3, 3), numpy.float32) + numpy.random.default_rng(1).random((80, 70, 3, 3),
