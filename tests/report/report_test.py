@@ -114,6 +114,17 @@ class Page(PageTest):
             "e.innerText)"),
                          ["0.00370", "9.2×"])
 
+    def test_numbers_have_no_e(self):
+        self.open()
+        self.assertIn("7.30 × 10⁻⁵", self.page.text("#failures tbody"))
+
+    def test_axes_hold_all_error_bars(self):
+        self.open()
+        self.page.box(".plot:nth-of-type(2) canvas")
+        self.settle()
+        highest = self.page.evaluate("Chart.getChart(document.querySelectorAll('.plot canvas')[1]).scales.y.max")
+        self.assertGreaterEqual(highest, 19)
+
     def test_best_of_each_group(self):
         self.open()
         self.assertEqual(self.page.evaluate("[...document.querySelectorAll('#failures .best')].map(e => e.innerText)"),

@@ -40,8 +40,7 @@ function scale_values({ low, high, logarithmic }, gain, n) {
 /** Texts of the scale's marks, evenly spaced. */
 function scale_marks(scale, gain) {
   const n = scale.logarithmic ? Math.round(Math.log10(scale.high / scale.low)) + 1 : 5;
-  const plain = (v) => significant(v, 2).replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "");  // without zeros at the end
-  return scale_values(scale, gain, n).map((v) => (scale.percent ? percent_text(v) : plain(v)));
+  return scale_values(scale, gain, n).map((v) => (scale.percent ? percent_text(v) : short_text(v, 2)));
 }
 
 function css_ramp(ramp) {

@@ -1,15 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 // Numbers as text.
 
+/** "7.3 × 10⁻⁵" for "7.3e-5". */
+function power_of_ten(text) {
+  const [mantissa, exponent] = text.split("e");
+  const raised = (c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)];
+  return `${mantissa} × 10${exponent.replace("+", "").replace(/[-\d]/g, raised)}`;
+}
+
 /** `value` with `digits` significant digits; powers of ten only where plain digits would be long. */
 function significant(value, digits = 3) {
   if (!Number.isFinite(value)) return Number.isNaN(value) ? "nan" : value > 0 ? "inf" : "−inf";
   if (value === 0) return "0";
   const size = Math.abs(value);
-  const text = size < 1e-4 || size >= 1e7 ? value.toExponential(digits - 1)
+  const text = size < 1e-4 || size >= 1e7 ? power_of_ten(value.toExponential(digits - 1))
     : size >= 10 ** digits ? String(Math.round(value)) : value.toPrecision(digits);
-  return text.replace("e+", "e").replace(/-/g, "−");
+  return text.replace(/-/g, "−");
 }
+
+/** The same without zeros at the end of the fraction. */
+const short_text = (value, digits) =>
+  significant(value, digits).replace(/(\.\d*?)0+(?= |$)/, "$1").replace(/\.(?= |$)/, "");
 
 function seconds_text(value, digits) {
   if (value >= 3600) return `${significant(value / 3600, digits)} h`;

@@ -63,11 +63,13 @@ function axis_of(axis, values, own_ticks) {
   const common = { title: { display: Boolean(axis.label), text: axis.label, color: colours.text },
     grid: { color: colours.grid, drawBorder: false }, ticks: { color: colours.text, maxRotation: 0 } };
   if (axis.scale === "category") return { ...common, type: "category", grid: { display: false } };
-  if (axis.scale !== "log") return { ...common, type: "linear", beginAtZero: true };
+  if (axis.scale !== "log")  // with all error bars
+    return { ...common, type: "linear", beginAtZero: true, suggestedMin: Math.min(...values),
+      suggestedMax: Math.max(...values) };
   const positive = values.filter((v) => v > 0);
   return { ...common, type: "logarithmic", min: Math.min(...positive) / 1.25, max: Math.max(...positive) * 1.25,
     afterBuildTicks(scale) { scale.ticks = log_ticks(scale, own_ticks ? positive : []).map((value) => ({ value })); },
-    ticks: { ...common.ticks, autoSkip: false, callback: (value) => String(Number(value.toPrecision(3))) } };
+    ticks: { ...common.ticks, autoSkip: false, callback: (value) => short_text(value, 3) } };
 }
 
 function dataset_of(series) {
