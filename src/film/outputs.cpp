@@ -42,7 +42,8 @@ void check_extension(const std::string& option, const std::string& path, OutputK
     case OutputKind::kPage:
       return require({".html", ".htm"}, "");
     case OutputKind::kText:
-      if (ends_in(path, image_extensions()) || ends_in(path, {".xml", ".html", ".htm", ".ply", ".obj", ".serialized"}))
+      if (ends_in(path, image_extensions()) ||
+          ends_in(path, {".xml", ".pbrt", ".gltf", ".glb", ".html", ".htm", ".ply", ".obj", ".serialized"}))
         usage(
             fmt::format("{0} '{1}' names an image, a page or part of a scene; give {0}=- for standard output, or the "
                         "name of a text file",

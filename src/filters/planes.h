@@ -48,7 +48,7 @@ void for_each_batch(int width, int height, const Batch& batch) {
   });
 }
 
-/// Value of guide images outside the frame and at pixels with non-finite input: farther from every real pixel than any
+/// Value of features outside the frame and at pixels with non-finite input: farther from every real pixel than any
 /// bandwidth, but with a finite square.
 inline constexpr float kFar = 1e18f;
 /// Error variance of such pixels, which prevents a coefficient.

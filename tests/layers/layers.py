@@ -252,7 +252,7 @@ def documented_names_match_registries(root):
             heading = re.search(r"\(`(\w+)`\)$", text)
             module = heading[1] if heading else None
         elif module and text.startswith("### "):
-            documented.setdefault(module, set()).update(re.findall(r"`(\w+)`", text))
+            documented.setdefault(module, set()).update(re.findall(r"`([\w-]+)`", text))
     problems = []
     for module, names in REGISTRIES.items():
         registered = set()
@@ -260,7 +260,7 @@ def documented_names_match_registries(root):
             if not os.path.exists(os.path.join(root, path)):
                 continue
             text = "\n".join(text.split("//")[0] for _, text in lines(root, path))
-            found = re.findall(r'\{\s*"(\w+)"\s*,\s*(?:make_|k[A-Z])\w+\s*\}|PLUGIN\(T, (\w+)\)', text)
+            found = re.findall(r'\{\s*"([\w-]+)"\s*,\s*(?:make_|k[A-Z])\w+\s*\}|PLUGIN\(T, (\w+)\)', text)
             found = [first or second for first, second in found]
             registered.update(found)
             if not found:
