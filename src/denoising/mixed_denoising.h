@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "denoising/candidates.h"
+#include "denoising/denoising_choice.h"
 #include "denoising/denoising_parts.h"
 #include "denoising/history.h"
 #include "denoising/mixture_name.h"
@@ -34,12 +35,6 @@ enum class DenoiseMode {
   kBias,      ///< 4 squared bias + variance; with residual correction
   kBalanced,  ///< 2 squared bias + variance; with residual correction
   kError,     ///< least error
-};
-
-/// The history of a frame of a sequence. Mixed in if there are enough samples for a mixture; layers do not use it.
-struct MixingHistory {
-  std::shared_ptr<const History> before;  ///< made of the previous frame; or null
-  bool keep_samples = false;              ///< fill EstimatorResult::kept_samples for the next frame
 };
 
 struct MeanMixture;     // mean_mixture.h
@@ -66,16 +61,8 @@ bool can_be_denoised(const Method& method);
 /// What kMixture denoises, with these options. Throws Error(kUsage) listing everything wrong with them.
 Method make_mixture(Settings& options);
 
-/// MixedDenoisingOptions as text, as on the command line.
-struct DenoisingChoice {
-  static constexpr const char *kNone = "none", *kAuto = "auto";
-  std::string mode = kNone;  ///< one of denoise_mode_names()
-  std::string oidn;          ///< a library or its folder; "": search for it, "off": do not use it
-  MixingHistory history;     ///< MixedDenoisingOptions::history; not an option
-  bool denoises() const { return mode != kNone; }
-  bool uses_oidn() const { return denoises() && oidn != "off"; }
-};
-/// `is_all`: the caller has no other use for Open Image Denoise, so `oidn` without `denoise` is an error.
+/// `denoise` and `oidn`, MixedDenoisingOptions as text. `is_all`: the caller has no other use for the network, so
+/// `oidn` without `denoise` is an error.
 void declare(Settings& settings, DenoisingChoice& choice, bool is_all = true);
 constexpr const char* kNotDenoised = "without `denoise` auto, bias, balanced or error";
 

@@ -104,6 +104,26 @@ class Package(unittest.TestCase):
             with self.assertRaisesRegex(AssertionError, message):
                 self.run_in_folder(self.examples / "combine_arrays", *given, "short", "short", "out")
 
+    def test_combining_files_gives_the_image_of_the_program(self):
+        """A pair of films, and two independent renders."""
+        covary, small = self.prefix / "bin" / "covary", ("--resolution", "48x32", "--no-preview", "--quiet")
+        self.run_in_folder(covary, "render", ROOM, "-o", "pair.exr", *small, "--spp", 2 * GROUPS, "--groups", GROUPS,
+                           "--estimator", "iicv", "--passes", "pair")
+        films = ("pair/independent.exr", "--crn", "pair/crn.exr")
+        printed = self.run_in_folder(self.examples / "combine_files", "own.exr", *films)
+        self.assertRegex(printed, rf"^{GROUPS} \+ {GROUPS} groups, predicted relMSE 0\.\d+\n$")
+        self.run_in_folder(covary, "combine", "--independent", *films, "--error", "-o", "program.exr", "--quiet")
+        self.assertEqual(rgb(self.work / "own.exr"), rgb(self.work / "program.exr"))
+        for seed in (1, 2):
+            self.run_in_folder(covary, "render", ROOM, "-o", f"{seed}.exr", *small, "--spp", 8, "--seed", seed,
+                               "--estimator", "none")
+        printed = self.run_in_folder(self.examples / "combine_files", "own.exr", "1.exr", "2.exr")
+        self.assertRegex(printed, r"^0 \+ 2 groups, predicted relMSE 0\.\d+\n$")
+        self.run_in_folder(covary, "denoise", "1.exr", "2.exr", "-o", "denoised.exr", "--quiet")
+        self.assertEqual(rgb(self.work / "own.exr"), rgb(self.work / "denoised.exr"))
+        with self.assertRaisesRegex(AssertionError, r"combine_files: .*none\.exr"):
+            self.run_in_folder(self.examples / "combine_files", "own.exr", "none.exr", "1.exr")
+
     def test_rendering_gives_the_image_of_the_program(self):
         self.run_in_folder(self.prefix / "bin" / "covary", "render", ROOM, "-o", "a.exr", "--resolution", "120x80",
                            "--spp", 24, "--no-preview", "--quiet")
@@ -152,7 +172,7 @@ class Package(unittest.TestCase):
 
     def test_programs_are_compiled_for_every_processor(self):
         commands = json.loads((self.examples / "compile_commands.json").read_text())
-        self.assertEqual(len(commands), 3)
+        self.assertEqual(len(commands), 4)
         for command in commands:
             self.assertNotRegex(command["command"], r"\s-(m|f(?!sanitize)|O|W)")
 
