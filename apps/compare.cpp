@@ -8,6 +8,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "commands.h"
@@ -227,8 +228,8 @@ void check_files(const CompareOptions& options) {
     outputs.writes_result("--error-map", path, OutputKind::kPng, "compare", options.overwrite);
 }
 
-/// Compares one view of the files; returns the JSON, if requested.
-std::string compare_view(const CompareOptions& options) {
+/// Compares one view of the files; returns the JSON, if requested. `printed`: warnings of other views.
+std::string compare_view(const CompareOptions& options, std::set<std::string>& printed) {
   std::vector<ImageRows> references;
   for (const std::string& path : {options.reference, options.reference2})
     if (!path.empty()) references.emplace_back(path, chosen_layer(path, options.choice));
@@ -246,7 +247,8 @@ std::string compare_view(const CompareOptions& options) {
 
   std::vector<std::vector<std::string>> warnings = warn_of_comparison(
       options.images,
-      options.reference2.empty() ? std::vector{options.reference} : std::vector{options.reference, options.reference2});
+      options.reference2.empty() ? std::vector{options.reference} : std::vector{options.reference, options.reference2},
+      printed);
   for (size_t i = 0; i < comparisons.size(); ++i)
     for (const std::string& text : noise_warnings(options, options.images[i], comparisons[i]))
       fmt::print(stderr, "warning: {}\n", text), warnings[i].push_back(text);
@@ -269,12 +271,13 @@ void compare(const CompareOptions& options) {
     throw Error(ErrorCode::kUsage, "--error-map is an option of one view; name it by --view");
   const bool json_to_output = options.json && (options.json->empty() || *options.json == "-");
   std::string json;
+  std::set<std::string> printed;
   for (const PictureChoice& view : views) {
     CompareOptions one = options;
     one.choice = view;
     if (views.size() > 1 && !json_to_output)
       fmt::print("view {}\n", printable(view.view.empty() ? view.layer : view.view));
-    json += compare_view(one);
+    json += compare_view(one, printed);
   }
   if (options.json) write_text_output(*options.json, json);
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "comparison_warnings.h"
 #include "core/error.h"
@@ -194,8 +195,12 @@ void print_multiples(const std::vector<ComparedSequence>& sequences, const Compa
   }
 }
 
-std::vector<std::string> warnings_of(const CompareOptions& o, const std::string& pattern, int frame) {
-  return warn_of_comparison({frame_name(pattern, frame)}, references_of(o, frame))[0];
+/// Of the first frame of each sequence.
+std::vector<std::vector<std::string>> warnings_of(const CompareOptions& o, int frame) {
+  std::vector<std::string> files;
+  for (const std::string& pattern : o.images) files.push_back(frame_name(pattern, frame));
+  std::set<std::string> printed;
+  return warn_of_comparison(files, references_of(o, frame), printed);
 }
 
 }  // namespace
@@ -249,9 +254,10 @@ void compare_frames(const CompareOptions& o) {
 
   std::string json;
   size_t width = 5;
-  for (const ComparedSequence& s : sequences) {
-    const std::vector<std::string> warnings = warnings_of(o, s.pattern, frames[0]);
-    if (o.json) json += json_text(json_of(o, s, baseline ? &*baseline : nullptr, frames, warnings), -1);
+  const std::vector<std::vector<std::string>> warnings = warnings_of(o, frames[0]);
+  for (size_t i = 0; i < sequences.size(); ++i) {
+    const ComparedSequence& s = sequences[i];
+    if (o.json) json += json_text(json_of(o, s, baseline ? &*baseline : nullptr, frames, warnings[i]), -1);
     width = std::max({width, s.pattern.size(), frame_name(s.pattern, frames.back()).size()});
   }
   if (!o.json || !(o.json->empty() || *o.json == "-")) {

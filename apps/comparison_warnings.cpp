@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <set>
-
 #include "metrics/provenance.h"
 
 namespace covary {
@@ -17,7 +15,8 @@ void append(const std::vector<std::string>& more, std::vector<std::string>& all)
 }  // namespace
 
 std::vector<std::vector<std::string>> warn_of_comparison(const std::vector<std::string>& images,
-                                                         const std::vector<std::string>& references) {
+                                                         const std::vector<std::string>& references,
+                                                         std::set<std::string>& printed) {
   std::vector<ImageFacts> facts;
   std::vector<std::string> of_references;
   for (const std::string& path : references) {
@@ -33,7 +32,6 @@ std::vector<std::vector<std::string>> warn_of_comparison(const std::vector<std::
     for (const ImageFacts& reference : facts) append(comparison_warnings(image, reference), found);
     if (facts.size() == 1) append(reference_warnings(image, facts[0]), found);  // with two, their noise cancels
   }
-  static std::set<std::string> printed;  // by this program: sequences have the same references
   for (const auto& warnings : result)
     for (const std::string& warning : warnings)
       if (printed.insert(warning).second) fmt::print(stderr, "warning: {}\n", warning);

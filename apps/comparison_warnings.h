@@ -2,14 +2,17 @@
 // Reasons to doubt a comparison, for every command that compares images.
 #pragma once
 
+#include <set>
 #include <string>
 #include <vector>
 
 namespace covary {
 
 /// Prints, as warnings, reasons in the files to doubt each image or its errors against the references (none, one or
-/// two); reasons about the references come first. Each is printed once. Returns those of each image.
+/// two); reasons about the references come first. Returns those of each image. `printed`: what the command has printed,
+/// which is not printed again.
 std::vector<std::vector<std::string>> warn_of_comparison(const std::vector<std::string>& images,
-                                                         const std::vector<std::string>& references);
+                                                         const std::vector<std::string>& references,
+                                                         std::set<std::string>& printed);
 
 }  // namespace covary

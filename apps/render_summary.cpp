@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a render tells its user at the end: what was written, where the time went, how good it is, what would help next.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <sstream>
 #include <string>
 
 #include "core/shell_text.h"
@@ -19,6 +16,7 @@
 #include "render_progress.h"
 #include "render_steps.h"
 #include "risk_report.h"
+#include "video.h"
 
 namespace covary {
 namespace {
@@ -149,19 +147,6 @@ void print_frame(const RenderReport& report, const std::string& frame) {
              seconds_text(times.total() - times.loading), report.result.predicted ? "; " + quality_text(report) : "");
 }
 
-namespace {
-
-/// Whether the shell would find it.
-bool is_program(const std::string& name) {
-  const char* path = std::getenv("PATH");
-  std::istringstream folders(path ? path : "");
-  for (std::string folder; std::getline(folders, folder, ':');)
-    if (access((folder + "/" + name).c_str(), X_OK) == 0) return true;
-  return false;
-}
-
-}  // namespace
-
 void print_frames(const RenderOptions& options, int n_made, int n_frames, const PhaseTimes& times) {
   const std::string& output = options.request().output;
   const std::string made = n_made == n_frames ? fmt::format("{} frame{}", n_frames, n_frames > 1 ? "s" : "")
@@ -169,7 +154,7 @@ void print_frames(const RenderOptions& options, int n_made, int n_frames, const 
   fmt::print(stderr, "{}: {}\ntime: {}\n", output, made, text_of(times, estimate_name(options)));
   if (n_frames > 1)
     fmt::print(stderr, "next: `covary convert {} {}` makes a video{}\n", shell_text({output}), "video.mp4",
-               is_program("ffmpeg") ? "" : ", with ffmpeg, which is not installed");
+               is_ffmpeg_installed() ? "" : ", with ffmpeg, which is not installed");
 }
 
 }  // namespace covary

@@ -2,13 +2,15 @@
 #include "video.h"
 
 #include <fmt/format.h>
-#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
+#include <sstream>
 #include <string_view>
 #include <utility>
 
@@ -19,15 +21,18 @@
 #include "film/outputs.h"
 
 namespace covary {
-namespace {
-
-constexpr int kNotFound = 127;  // of a shell whose program is missing
-
-}  // namespace
 
 bool is_video_name(const std::string& path) {
   constexpr std::array<std::string_view, 4> kEndings = {".mp4", ".mkv", ".mov", ".webm"};
   return std::find(kEndings.begin(), kEndings.end(), lower_extension(path)) != kEndings.end();
+}
+
+bool is_ffmpeg_installed() {
+  const char* path = std::getenv("PATH");
+  std::istringstream folders(path ? path : "");
+  for (std::string folder; std::getline(folders, folder, ':');)
+    if (access(((folder.empty() ? "." : folder) + "/ffmpeg").c_str(), X_OK) == 0) return true;
+  return false;
 }
 
 VideoWriter::VideoWriter(const std::string& path, double rate) : path_(path), rate_(rate) {
@@ -42,6 +47,8 @@ VideoWriter::~VideoWriter() {
 }
 
 void VideoWriter::start(int width, int height) {
+  if (!is_ffmpeg_installed())
+    throw Error(ErrorCode::kIo, "videos need the program ffmpeg, which is not installed (Debian: apt install ffmpeg)");
   width_ = width, height_ = height;
   // Codecs need even sizes: adds a black column or row. All players support half-resolution chroma (yuv420p).
   const std::string command = shell_text({"ffmpeg",
@@ -66,7 +73,7 @@ void VideoWriter::start(int width, int height) {
                                           "-y",
                                           temporary_});
   std::signal(SIGPIPE, SIG_IGN);  // reported as a write error if ffmpeg ends early
-  pipe_ = popen(("command -v ffmpeg > /dev/null || exit 127; " + command).c_str(), "w");  // without the shell's words
+  pipe_ = popen(command.c_str(), "w");
   if (!pipe_) throw Error(ErrorCode::kIo, "cannot start ffmpeg");
 }
 
@@ -86,8 +93,6 @@ void VideoWriter::add(const Image& frame) {
 void VideoWriter::finish() {
   if (!pipe_) throw Error(ErrorCode::kIo, fmt::format("there are no frames for '{}'", path_));
   const int status = pclose(std::exchange(pipe_, nullptr));
-  if (WIFEXITED(status) && WEXITSTATUS(status) == kNotFound)
-    throw Error(ErrorCode::kIo, "videos need the program ffmpeg, which is not installed (Debian: apt install ffmpeg)");
   if (status != 0) throw Error(ErrorCode::kIo, fmt::format("ffmpeg could not write '{}'", path_));
   std::error_code error;
   std::filesystem::rename(temporary_, path_, error);

@@ -13,17 +13,21 @@ namespace covary {
 /// Whether the name ends in .mp4, .mkv, .mov or .webm.
 bool is_video_name(const std::string& path);
 
+/// Whether the shell would find ffmpeg.
+bool is_ffmpeg_installed();
+
 /// Frames are sent to ffmpeg's input one by one as 8-bit sRGB; the video gets its name only when complete.
 class VideoWriter {
  public:
-  /// `rate`: frames per second. Throws Error(kIo) if ffmpeg cannot be started.
+  /// `rate`: frames per second.
   VideoWriter(const std::string& path, double rate);
   /// Ends ffmpeg, and removes its output unless finish() succeeded.
   ~VideoWriter();
   VideoWriter(const VideoWriter&) = delete;
   VideoWriter& operator=(const VideoWriter&) = delete;
 
-  /// Linear RGB. Throws Error(kInput) if the size differs from the first frame's, and Error(kIo) if ffmpeg has ended.
+  /// Linear RGB. Throws Error(kInput) if the size differs from the first frame's, and Error(kIo) if ffmpeg
+  /// cannot be started or has ended.
   void add(const Image& frame);
   /// Throws Error(kIo) if ffmpeg failed or there was no frame.
   void finish();

@@ -14,6 +14,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "browser.h"
@@ -249,7 +250,8 @@ std::vector<std::string> warnings_of(const ViewOptions& options) {
     references.push_back(options.reference);
     std::erase(images, options.reference);
   }
-  for (const std::vector<std::string>& warnings : warn_of_comparison(images, references))
+  std::set<std::string> printed;
+  for (const std::vector<std::string>& warnings : warn_of_comparison(images, references, printed))
     for (const std::string& warning : warnings)
       if (std::find(all.begin(), all.end(), warning) == all.end()) all.push_back(warning);
   return all;

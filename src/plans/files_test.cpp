@@ -265,6 +265,13 @@ TEST(FolderLock, NamesTheProcessThatHoldsTheFolder) {
   for (const int file : {ready[0], ready[1], done[0], done[1]}) close(file);
 }
 
+TEST(FolderLock, MakesTheLastFolderOnlyAsOutputsDo) {
+  const TemporaryFolder folder;
+  EXPECT_TRUE(contains(message_of([&] { FolderLock(folder.file("missing/films")); }, ErrorCode::kIo),
+                       "there is no folder '" + folder.file("missing") + "', which would hold it"));
+  EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
 TEST(Memory, CountsFilmsAuxiliaryImagesAndEstimator) {
   const LoadedScene scene = load_sized(kRoom, 100, 50);
   RenderRequest request = request_of(48);

@@ -13,6 +13,7 @@
 #include <filesystem>
 
 #include "core/error.h"
+#include "film/output_folder.h"
 
 namespace covary {
 namespace {
@@ -41,8 +42,7 @@ FolderLock::FolderLock(const std::string& folder) : path_((fs::path(folder) / ".
   std::error_code error;
   if (fs::exists(folder, error) && !fs::is_directory(folder, error))
     throw Error(ErrorCode::kIo, fmt::format("'{}' is not a folder; films of passes are kept in one", folder));
-  fs::create_directories(folder, error);
-  if (error) throw Error(ErrorCode::kIo, fmt::format("cannot make the folder '{}': {}", folder, error.message()));
+  make_output_folder(folder);
   for (;;) {
     file_ = open(path_.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
     if (file_ < 0)

@@ -16,6 +16,7 @@
 #include "core/json_depth.h"
 #include "film/film_file.h"
 #include "film/output_file.h"
+#include "film/output_folder.h"
 #include "film/splat_layer.h"
 #include "plans/made_of.h"
 
@@ -88,13 +89,6 @@ void resume(const RenderRequest& request, Pass& pass) {
   if (request.until > 0 && budgets) film.attributes[film_key::kBudgets] = budgets.mapped();
   film.aovs.clear();
   pass.film = std::move(film);
-}
-
-void make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error)
-    throw Error(ErrorCode::kIo, fmt::format("cannot make the folder '{}': {}", folder.string(), error.message()));
 }
 
 /// Whether the file is the film of an interrupted render, and not a sum of films, which are in a folder beside it.
@@ -202,7 +196,7 @@ void take_film_on_disk(const RenderRequest& request, const std::function<void(co
 void save_passes(const RenderRequest& request, std::span<Pass> passes, bool complete) {
   for (Pass& pass : passes) {
     if (pass.path.empty()) continue;
-    if (!is_output(pass, request)) make_folder(passes_folder(request));
+    if (!is_output(pass, request)) make_output_folder(passes_folder(request));
     pass.film.attributes[film_key::kComplete] = complete ? "true" : "false";
     if (pass.temporary) pass.film.attributes[film_key::kTemporary] = "true";
     write_film(pass.path, pass.film);
