@@ -5,8 +5,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <set>
+#include <string_view>
 
 #include "core/error.h"
 #include "film/input_error.h"
@@ -18,6 +20,9 @@ namespace {
 constexpr const char* kAll = "all";
 /// The picture that Blender's compositor made, in the file of the renders that it was made of.
 constexpr const char* kComposite = "Composite";
+
+/// Layers of this project's results that tell of the picture beside them.
+constexpr std::array<std::string_view, 2> kEstimatedErrors = {"StdError", "Bias"};
 
 std::string folder_of(const std::string& name) {
   const size_t dot = name.rfind('.');
@@ -46,6 +51,10 @@ std::vector<Candidate> candidates_of(const std::vector<ExrFile::Channel>& channe
     all.push_back(std::move(c));
   }
   return all;
+}
+
+bool is_estimated_error(const Candidate& c) {
+  return std::find(kEstimatedErrors.begin(), kEstimatedErrors.end(), last_part(c.name)) != kEstimatedErrors.end();
 }
 
 std::vector<Picture> pictures_of(const std::vector<Candidate>& candidates, auto&& accepts) {
@@ -219,9 +228,11 @@ std::vector<Picture> find_pictures(const std::vector<ExrFile::Channel>& channels
   if (pictures.empty()) pictures = named_pictures(candidates);
   if (!pictures.empty()) return pictures;
   std::set<std::string> names;
-  for (const Candidate& c : candidates) names.insert(c.name);
+  for (const Candidate& c : candidates)
+    if (!is_estimated_error(c)) names.insert(c.name);
   if (names.size() > 1) return {};
-  return names.empty() ? grey_pictures(channels) : pictures_of(candidates, [](const Candidate&) { return true; });
+  return names.empty() ? grey_pictures(channels)
+                       : pictures_of(candidates, [](const Candidate& c) { return !is_estimated_error(c); });
 }
 
 std::vector<Picture> chosen_pictures(const std::string& path, const std::vector<ExrFile::Channel>& channels,

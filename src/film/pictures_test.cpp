@@ -41,6 +41,7 @@ TEST(Pictures, AreFoundByTheNamesOfRenderers) {
   EXPECT_EQ(pictures(layers({"default", "diffuse"})), "'default'");
   EXPECT_EQ(pictures(layers({"beauty", "uCryptoObject00"})), "'beauty'");
   EXPECT_EQ(pictures(layers({"light", "uCryptoObject00", "uCryptoObject01"})), "'light'") << "the only colours";
+  EXPECT_EQ(pictures(layers({"light", "StdError", "Bias"})), "'light'") << "a result of denoise";
   EXPECT_EQ(pictures(layers({"ambient", "diffuse"})), "");
   EXPECT_EQ(pictures({{"Y", "half", ""}}), "R G B") << "grey has no name, either";
   EXPECT_EQ(pictures({{"Y", "half", ""}, {"RY", "half", ""}, {"BY", "half", ""}}), "");

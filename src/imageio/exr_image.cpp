@@ -135,10 +135,20 @@ constexpr size_t kLongestName = 255;
 
 constexpr int kLastCompression = Imf::NUM_COMPRESSION_METHODS - 1;
 
-/// Of later versions of OpenEXR (ImfCompression.h of 3.4).
+/// Of later versions of OpenEXR (ImfCompression.h of 3.4 and 3.5).
 std::string new_compression(int number) {
-  return number == 10 ? "HTJ2K256 (of OpenEXR 3.4)"
-                      : (number == 11 ? "HTJ2K32 (of OpenEXR 3.4)" : fmt::format("number {}", number));
+  switch (number) {
+    case 10:
+      return "HTJ2K256 (of OpenEXR 3.4)";
+    case 11:
+      return "HTJ2K32 (of OpenEXR 3.4)";
+    case 12:
+      return "LJ2K (of OpenEXR 3.5)";
+    case 13:
+      return "ZSTD (of OpenEXR 3.5)";
+    default:
+      return fmt::format("number {}", number);
+  }
 }
 
 class HeaderCheck {

@@ -332,9 +332,10 @@ class Info(PicturesTest):
     def test_future_compressions_are_named(self):
         data = exr({c: [1.0] * 12 for c in "RGB"}, (4, 3))
         at = data.index(b"compression\0compression\0") + 28
-        self.write("f.exr", data[:at] + b"\x0b" + data[at + 1:])
-        self.bad(1, "f.exr: compression HTJ2K32 (of OpenEXR 3.4), which is newer than this program's OpenEXR; save the "
-                    "file with another one, e.g. ZIP or PIZ", "info", "f.exr")
+        for number, name in ((11, "HTJ2K32 (of OpenEXR 3.4)"), (13, "ZSTD (of OpenEXR 3.5)"), (99, "number 99")):
+            self.write("f.exr", data[:at] + bytes([number]) + data[at + 1:])
+            self.bad(1, f"f.exr: compression {name}, which is newer than this program's OpenEXR; save the file with "
+                        "another one, e.g. ZIP or PIZ", "info", "f.exr")
 
 
 class Sequences(PicturesTest):
