@@ -147,6 +147,10 @@ Image as_alpha(const Image& grey) {
 Denoised denoise_by_network(const Options& o, const Task& task, ProgressLine& progress) {
   const Stopwatch watch;
   const std::string& input = o.inputs[0];
+  if (!DenoisingChoice{"auto", o.oidn, {}}.uses_oidn())
+    usage("'" + input +
+          "' is one image, which only Open Image Denoise denoises: leave out --oidn off, or give a "
+          "second render of another seed, too");
   const ImageInfo info = inspect_image(input);
   require_memory_of_network(input, info.place.window, o.memory_mib);
   FeatureLayers features = features_of(o, task, ImageRows(input, task.layer).colours());

@@ -104,6 +104,13 @@ bool is_noisy(const GroupedSource& source) {
   return false;
 }
 
+bool all_have(const std::string& channel, const std::vector<std::string>& files) {
+  return std::ranges::all_of(files, [&](const std::string& file) {
+    return std::ranges::any_of(inspect_image(file).channels,
+                               [&](const ExrFile::Channel& c) { return c.name == channel; });
+  });
+}
+
 }  // namespace
 
 std::vector<BeautyLayer> find_beauty_layers(const Picture& picture, const std::vector<ExrFile::Channel>& channels) {
@@ -133,10 +140,11 @@ BeautyLayers::BeautyLayers(const std::vector<std::string>& files, const Picture&
   }
   if (!with_alpha || files.size() < 2) return;
   alpha_ = alpha_channel(channels, picture.channels[0]);
-  if (alpha_.empty()) return;
-  files_.emplace_back(files, alpha_);
-  if (is_noisy(source_of(files_.back()))) return;
-  files_.pop_back();
+  if (!alpha_.empty() && all_have(alpha_, files)) {
+    files_.emplace_back(files, alpha_);
+    if (is_noisy(source_of(files_.back()))) return;
+    files_.pop_back();
+  }
   alpha_.clear();
 }
 

@@ -254,6 +254,7 @@ InputFindings examine(const CombineRequest& request) {
   check_denoised(independent.origin, independent.groups, inputs.findings);
   SameSeedChecks crn_seeds(independent.width, independent.height, groups_with_seeds(request.crn));
   SameSeedChecks seeds(independent.width, independent.height, groups_with_seeds(independent));
+  LayerChecks layers(request.layers);
   StrayValues of_crn, of_independent;
   const int step = std::max(kMinRows, rows_in_memory(request));
   bool checkable = true;
@@ -263,6 +264,7 @@ InputFindings examine(const CombineRequest& request) {
     checkable = !request.estimator.adaptive || (!lacks_samples(g) && !lacks_samples(h));
     if (checkable) checks.add_rows(g, h);
     differences.add_rows(h);
+    layers.add_rows(y, h);
     crn_seeds.add_rows(g), seeds.add_rows(h);
     of_crn.add_rows(g), of_independent.add_rows(h);
   }
@@ -274,6 +276,7 @@ InputFindings examine(const CombineRequest& request) {
   inputs.strays_of_crn = of_crn.found(), inputs.strays = of_independent.found();
   report(inputs.strays_of_crn, crn_names, inputs.report.findings);
   report(inputs.strays, names, inputs.report.findings);
+  layers.report(names, inputs.report.findings);
   inputs.findings.insert(inputs.findings.end(), inputs.report.findings.begin(), inputs.report.findings.end());
   return inputs;
 }

@@ -125,7 +125,8 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
   else if (!(file.place() == place_))
     fail_input(
         path,
-        fmt::format("{} x {} pixels at ({}, {}) of a frame of {} x {}; {} has {} x {} at ({}, {}) of {} x {}",
+        fmt::format("{} x {} pixels at ({}, {}) of a frame of {} x {}; {} has {} x {} at ({}, {}) of {} x {}; "
+                    "render both with the same size and crop, without automatic cropping",
                     file.place().window.width, file.place().window.height, file.place().window.x, file.place().window.y,
                     file.place().frame_width, file.place().frame_height, source_.files[0], place_.window.width,
                     place_.window.height, place_.window.x, place_.window.y, place_.frame_width, place_.frame_height));

@@ -145,7 +145,8 @@ TEST_F(GroupedFileTest, SaysWhatIsWrong) {
       message({plain, write("groups.exr", {"", "group0", "group1"})}),
       "groups.exr: holds 2 groups of samples; give it alone, or files of one image each, or --layer for the image");
   EXPECT_EQ(message({plain, write("wide.exr", {""}, 0, {}, 9)}),
-            "wide.exr: 9 x 5 pixels at (0, 0) of a frame of 9 x 5; plain.exr has 7 x 5 at (0, 0) of 7 x 5");
+            "wide.exr: 9 x 5 pixels at (0, 0) of a frame of 9 x 5; plain.exr has 7 x 5 at (0, 0) of 7 x 5; render both "
+            "with the same size and crop, without automatic cropping");
   EXPECT_EQ(
       message({write("a.exr", {""}, 0, {{"covary:samples", "8"}}), write("b.exr", {""}, 0, {{"covary:samples", "6"}})}),
       "b.exr: has 6 samples per pixel, a.exr 8; render all with the same number (in covary --spp)");

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "combine/grouped_source.h"
+#include "combine/input_checks.h"
 #include "estimators/method.h"
 
 namespace covary {
@@ -19,6 +20,23 @@ struct LayerSource {
   std::optional<std::string> sum = "";  ///< layers of the same sum add up to the image; none: not a part of it (alpha)
 };
 
+/// Finds values of layers that are not finite where the image is.
+class LayerChecks {
+ public:
+  explicit LayerChecks(std::span<const LayerSource> sources) : sources_(sources), bad_(sources.size()) {}
+  /// Rows first … of the image; each once.
+  void add_rows(int first, const GroupedImage& picture);
+  void report(const ImageNames& picture, std::vector<Finding>& findings) const;
+
+ private:
+  struct BadValues {
+    long pixels = 0;
+    int x = 0, y = 0, group = 0;  ///< the first
+  };
+  std::span<const LayerSource> sources_;
+  std::vector<BadValues> bad_;
+};
+
 /// The remainder of the image after the given layers; "Rest_lights" of the sum "lights".
 inline constexpr const char* kRest = "Rest";
 
@@ -27,13 +45,14 @@ inline constexpr const char* kRest = "Rest";
 class WholeLayers {
  public:
   /// The memory that `picture` and the sources refer to must outlive this object. Throws Error(kInput) if a layer has
-  /// other pixels or groups, is a duplicate, is named kRest, or has a non-finite value where the picture is finite.
+  /// other pixels or groups, is a duplicate, or is named kRest. A value that is not finite is left out: it becomes the
+  /// mean of the other groups', or 0.
   WholeLayers(const GroupedImage& picture, std::span<const LayerSource> sources);
   std::span<const Layer> view() const { return layers_; }
 
  private:
   std::vector<Layer> layers_;
-  std::deque<std::vector<float>> rests_;
+  std::deque<std::vector<float>> rests_, mended_;
 };
 
 }  // namespace covary

@@ -90,10 +90,29 @@ TEST(LayerSources, AreOfTheImagesPixelsAndGroups) {
   EXPECT_NE(message(lamps.request({{"key", Lamps::source(lamps.key)}, {"key", Lamps::source(lamps.key)}}))
                 .find("the layer 'key' appears twice"),
             std::string::npos);
+}
+
+TEST(LayerSources, AreLeftOutWhereTheyAreNotFinite) {
+  const Lamps lamps;
   std::vector<float> broken = lamps.key;
-  broken[5] = NAN;
-  EXPECT_NE(message(lamps.request({{"key", Lamps::source(broken)}})).find("has values that are not finite"),
-            std::string::npos);
+  constexpr size_t kPixel = 2 * kWidth + 5;
+  float* const values = &broken[kPixel * 3 * kGroups];
+  values[3 + 1] = NAN;  // green of the second group
+  const CombineRequest request = lamps.request({{"key", Lamps::source(broken)}, {"fill", Lamps::source(lamps.fill)}});
+  const CombinedImage combined = combine(request);
+  expect_sum(combined);
+  std::vector<std::string> texts;
+  for (const Finding& finding : combined.inputs.findings) texts.push_back(finding.text);
+  EXPECT_NE(std::find(texts.begin(), texts.end(),
+                      "the layer 'key': 1 of 768 pixels hold values that are not finite, the first at (5, 2) in render "
+                      "2; these values are left out; find the cause in the renderer"),
+            texts.end())
+      << testing::PrintToString(texts);
+
+  const GroupedImage picture = request.independent.all();
+  const WholeLayers whole(picture, request.layers);
+  const float others = (values[1] + values[6 + 1] + values[9 + 1]) / 3;
+  EXPECT_NEAR(whole.view()[0].image.pixel(5, 2)[3 + 1], others, 1e-6);
 }
 
 }  // namespace

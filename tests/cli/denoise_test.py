@@ -169,6 +169,8 @@ class Denoise(RenderTest):
         self.bad(2, "are the same file", "denoise", "plain.exr", "plain.exr", "-o", "e.exr", *PLAIN)
         self.bad(2, "--mode error needs a second render of another seed", "denoise", "plain.exr", "-o", "e.exr",
                  "--mode", "error")
+        self.bad(2, "'plain.exr' is one image, which only Open Image Denoise denoises: leave out --oidn off, or give a "
+                    "second render of another seed, too", "denoise", "plain.exr", "-o", "e.exr", *PLAIN)
         (self.path / "copy.exr").write_bytes((self.path / "plain.exr").read_bytes())
         self.bad(1, "plain.exr and copy.exr are identical: the same seed was rendered twice", "denoise", "plain.exr",
                  "copy.exr", "-o", "e.exr", *PLAIN)

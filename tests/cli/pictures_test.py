@@ -282,6 +282,10 @@ class Layers(PicturesTest):
         self.pair(lambda seed: {**colours("", noisy(seed)), "A": floats([1.0] * N)})
         self.denoise()
         self.assertEqual(self.read()["A"], [1.0] * N)
+        self.pair(make)
+        self.write("b.exr", exr(colours("", noisy(9)), SIZE))
+        self.denoise()
+        self.assertEqual(self.read()["A"], make(1)["A"], "the first render's, if it alone has one")
 
 
 class Info(PicturesTest):
