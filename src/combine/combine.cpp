@@ -14,6 +14,8 @@
 #include "core/error.h"
 #include "core/memory_limit.h"
 #include "core/stopwatch.h"
+#include "denoising/mixing_memory.h"
+#include "denoising/mixture_name.h"
 #include "denoising/network_memory.h"
 #include "denoising/rows_denoising.h"
 #include "estimators/mean.h"
@@ -118,6 +120,18 @@ MethodImage estimate(const CombineRequest& request) {
   return whole;
 }
 
+/// The default, of independent samples alone.
+bool mixes_mean(const CombineRequest& request) { return request.estimator.name == kMixture && !request.crn; }
+
+/// What it takes for so many pixels, all of the image's or those of a band.
+double memory_of_mixture(const CombineRequest& request, double n_pixels) {
+  const GroupedSource& image = request.independent;
+  const MixtureSize size{image.groups, request.settings.features.albedo != nullptr, !request.estimator.network.empty()};
+  const double mixed = n_pixels * bytes_of_mixture(size);
+  const bool is_whole = n_pixels >= static_cast<double>(image.width) * image.height;
+  return size.has_network && is_whole ? std::max(mixed, memory_beside_network(size, n_pixels)) : mixed;
+}
+
 }  // namespace
 
 double memory_of_rows(const CombineRequest& request, int rows) {
@@ -138,8 +152,10 @@ double memory_of_rows(const CombineRequest& request, int rows) {
   const double library = request.estimator.network.empty() ? 0 : network_library_memory();
   const double results = of_whole * width * request.independent.height + library;
   const double layers = request.layers.empty() ? 0 : static_cast<double>(request.layers.size() + 1);
+  const double of_method =
+      mixes_mean(request) ? memory_of_mixture(request, n_pixels) : request.estimator.memory.bytes(n_pixels, groups);
   return n_pixels * (values + layers * layer_bytes(request.independent.groups) + (in_bands ? n_features * kImage : 0)) +
-         request.estimator.memory.bytes(n_pixels, groups) + results;
+         of_method + results;
 }
 
 namespace {

@@ -14,6 +14,7 @@
 #include "denoising/layers.h"
 #include "denoising/mean_mixture.h"
 #include "denoising/mixed_rows.h"
+#include "denoising/mixing_memory.h"
 #include "denoising/mixture.h"
 #include "denoising/parts_mixture.h"
 #include "denoising/rows_denoising.h"
@@ -38,9 +39,8 @@ ModeSettings settings_of(DenoiseMode mode) {
   return *std::find_if(std::begin(kModes), std::end(kModes), [&](const ModeSettings& m) { return m.mode == mode; });
 }
 
-/// Approximate memory on top of the estimator's: images of three sets of samples, planes of filters and sums, half of
-/// 12 groups; for a mean, the means without fireflies and regression; with the network, its own and its candidates.
-constexpr double kBytesPerPixel = 440, kBytesOfMean = 340, kBytesWithOidn = 1250;
+/// Of films; up to 20 groups, their number does not matter for memory.
+constexpr int kUsualGroups = 12;
 
 /// The denoised layers of a mean.
 std::vector<Image> layers_of(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
@@ -356,7 +356,8 @@ Method with_denoising(const Method& base, const MixedDenoisingOptions& options) 
   method.predicts_error = method.reads_features = true;
   method.reliable_samples = base.reliable_samples;
   method.memory = base.memory;
-  method.memory.always += with_oidn ? kBytesWithOidn : kBytesPerPixel + (base.is_mean() ? kBytesOfMean : 0);
+  method.memory.always +=
+      base.is_mean() && !with_oidn ? bytes_of_mixture({.groups = kUsualGroups}) : bytes_of_pair_mixture(with_oidn);
   method.memory.of_halves = method.memory.of_halves_per_group = 0;  // part of that
   if (base.adaptive) {
     method.adaptive = base.adaptive;

@@ -320,6 +320,27 @@ class Denoise(RenderTest):
         self.assertGreater(facts["planned_memory_bytes"], 3 * 12 * size[0] * size[1])
         self.assertGreater(facts["peak_memory_bytes"], facts["planned_memory_bytes"])
 
+    @unittest.skipIf("SANITIZED" in os.environ, "sanitizers take memory of their own")
+    def test_memory_of_renders(self):
+        """What is planned is what is taken, or up to 1.3 times that; the program cancels between two sizes."""
+        sizes, chance = ((120, 90), (360, 270)), random.Random(5)
+        noise = [chance.expovariate(1) for _ in range(360 * 270)]
+        features = [f"albedo.{c}" for c in "RGB"] + [f"normal.{c}" for c in "XYZ"]
+        for layers, renders in (((), 2), (features, 2), (features, 4), ((), 40)):
+            planned, taken = [], []
+            for size in sizes:
+                n = size[0] * size[1]
+                for i in range(renders):
+                    planes = {c: noise[7 * i:n] + noise[:7 * i] for c in "RGB"} | {c: [0.5] * n for c in layers}
+                    self.write(f"{i}.exr", exr(planes, size))
+                facts = json.loads(self.good("denoise", *(f"{i}.exr" for i in range(renders)), "-o", "out.exr",
+                                             "--overwrite", "--json", "-", "--quiet", "--force", *PLAIN).stdout)
+                planned.append(facts["planned_memory_bytes"]), taken.append(facts["peak_memory_bytes"])
+            ratio = (planned[1] - planned[0]) / (taken[1] - taken[0])
+            with self.subTest(layers=len(layers), renders=renders, ratio=ratio):
+                self.assertGreaterEqual(ratio, 1)
+                self.assertLessEqual(ratio, 1.3)
+
     def test_layers_add_up(self):
         """Of two renders, with and without a network, by covary denoise and combine."""
         for seed in ("1", "2"):
