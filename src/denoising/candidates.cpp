@@ -225,11 +225,8 @@ CandidateMaker filtered_candidates(const Features& features, CandidateBase base,
 }
 
 void check_features(const Features& features) {
-  if (features.albedo) check_feature("the albedo", *features.albedo);
-  if (features.normal) check_feature("the normal", *features.normal);
-  if (features.denoising_albedo) check_feature("the albedo behind glass", *features.denoising_albedo);
-  if (features.denoising_normal) check_feature("the normal behind glass", *features.denoising_normal);
-  if (features.position) check_feature("the position", *features.position);
+  for (size_t i = 0; i < feature::kCount; ++i)
+    if (const Image* image = features.*kImagesOfFeatures[i]) check_feature(kAuxiliaryFeatures[i].name, *image);
 }
 
 Features network_features(const Features& features) {

@@ -20,18 +20,13 @@ static_assert(kBandCell % kResidualCell == 0 && kBandCell % kRegressionCell == 0
 
 /// Rows of the features.
 struct FeatureRows {
-  std::array<std::optional<Image>, 5> images;
+  std::array<Image, feature::kCount> images;
   Features features;
 
   FeatureRows(const Features& whole, int first, int n) {
-    const std::array<std::pair<const Image*, const Image**>, 5> all = {
-        {{whole.albedo, &features.albedo},
-         {whole.normal, &features.normal},
-         {whole.denoising_albedo, &features.denoising_albedo},
-         {whole.denoising_normal, &features.denoising_normal},
-         {whole.position, &features.position}}};
-    for (size_t i = 0; i < all.size(); ++i)
-      if (all[i].first) *all[i].second = &images[i].emplace(rows_of(*all[i].first, first, n));
+    for (size_t i = 0; i < feature::kCount; ++i)
+      if (const Image* image = whole.*kImagesOfFeatures[i])
+        images[i] = rows_of(*image, first, n), features.*kImagesOfFeatures[i] = &images[i];
     features.clean = whole.clean;
   }
   FeatureRows(const FeatureRows&) = delete;

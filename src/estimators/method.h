@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -17,6 +18,7 @@
 #include "core/spectrum.h"
 #include "estimators/estimator_result.h"
 #include "estimators/sample_counts.h"
+#include "film/auxiliary_features.h"
 #include "film/grouped_image.h"
 
 namespace covary {
@@ -32,6 +34,11 @@ struct Features {
   const Image* position = nullptr;  ///< of the first surface, in any unit
   bool clean = false;               ///< nearly noise-free, so that a network need not prefilter them
 };
+
+/// The images of Features, in the order of kAuxiliaryFeatures.
+inline constexpr std::array<const Image * Features::*, feature::kCount> kImagesOfFeatures = {
+    &Features::albedo, &Features::normal, &Features::position, &Features::denoising_albedo,
+    &Features::denoising_normal};
 
 /// A component of the image, such as direct light.
 struct Layer {

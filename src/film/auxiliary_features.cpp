@@ -40,11 +40,11 @@ constexpr std::string_view kDenoisingNormalNames[] = {
 }  // namespace
 
 constexpr std::array<AuxiliaryFeature, feature::kCount> kAuxiliaryFeatures = {{
-    {"Albedo", true, kAlbedoNames, feature::kDenoisingAlbedo},
-    {"N", false, kNormalNames, feature::kDenoisingNormal},
-    {"P", false, kPositionNames},
-    {"DenoisingAlbedo", true, kDenoisingAlbedoNames},
-    {"DenoisingNormal", false, kDenoisingNormalNames},
+    {"the albedo", "Albedo", true, kAlbedoNames, feature::kDenoisingAlbedo},
+    {"the normal", "N", false, kNormalNames, feature::kDenoisingNormal},
+    {"the position", "P", false, kPositionNames},
+    {"the albedo behind glass", "DenoisingAlbedo", true, kDenoisingAlbedoNames},
+    {"the normal behind glass", "DenoisingNormal", false, kDenoisingNormalNames},
 }};
 
 }  // namespace covary

@@ -16,6 +16,7 @@ enum Index : size_t { kAlbedo, kNormal, kPosition, kDenoisingAlbedo, kDenoisingN
 }  // namespace feature
 
 struct AuxiliaryFeature {
+  const char* name;   ///< in messages
   const char* layer;  ///< in covary's own films
   bool is_colour;     ///< converted to the colour space of the picture
   /// The last parts of its layers' names, of all renderers in docs/other-renderers.md; the first in a file counts.

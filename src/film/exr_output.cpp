@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/parallel.h"
+#include "film/auxiliary_features.h"
 #include "film/exr.h"
 #include "film/exr_library.h"
 #include "film/image_writer.h"
@@ -100,7 +101,9 @@ void add_image_planes(const std::string& name, Image& image, std::vector<ExrPlan
     return;
   }
   COVARY_CHECK(image.channels == 3, "an image of one or three channels");
-  const bool is_vector = name == "N" || name == "P" || name == "DenoisingNormal" || name == "Motion";
+  const bool is_vector = name == "Motion" || std::ranges::any_of(kAuxiliaryFeatures, [&](const AuxiliaryFeature& of) {
+                           return name == of.layer && !of.is_colour;
+                         });
   const std::string components = is_vector ? "XYZ" : "RGB";
   for (size_t c = 0; c < 3; ++c)
     planes.push_back({(name.empty() ? "" : name + ".") + components[c], ExrPlane::Type::kFloat, image.data.data() + c,

@@ -46,11 +46,12 @@ bool ends_in_medium(const Scene& scene, const PathRandom& random, Ray& ray, Auxi
     const float far = found ? hit.t : ray.t_max;
     if (const float t = medium ? sample_flight(*medium, ray, far, channel, numbers, weights, nullptr) : kInfinity;
         t < kInfinity) {
-      values[2] = ray.at(t);
-      const Medium::Coefficients here = medium->at(values[2]);
+      values[kPosition] = ray.at(t);
+      const Medium::Coefficients here = medium->at(values[kPosition]);
       for (int c = 0; c < 3; ++c)
-        values[0][c] = here.extinction[c] > 0 ? std::clamp(here.scattering[c] / here.extinction[c], 0.0f, 1.0f) : 0;
-      values[3] = values[0];
+        values[feature::kAlbedo][c] =
+            here.extinction[c] > 0 ? std::clamp(here.scattering[c] / here.extinction[c], 0.0f, 1.0f) : 0;
+      values[feature::kDenoisingAlbedo] = values[feature::kAlbedo];
       return true;
     }
     if (!found || hit.bsdf_flags != kNullTransmission) return false;
@@ -115,8 +116,8 @@ class Round {
   /// Values of the surface behind mirrors and glass of this throughput.
   void end_at(size_t sample, const SurfaceHit& hit, const Spectrum& throughput) {
     const Spectrum albedo = throughput * hit.bsdf->albedo(hit);
-    for (int c = 0; c < 3; ++c) values_[sample][3][c] = std::clamp(albedo[c], 0.0f, 1.0f);
-    values_[sample][4] = hit.frame.n;
+    for (int c = 0; c < 3; ++c) values_[sample][feature::kDenoisingAlbedo][c] = std::clamp(albedo[c], 0.0f, 1.0f);
+    values_[sample][feature::kDenoisingNormal] = hit.frame.n;
   }
 
   /// Continues all ways by one edge; those that end, at a surface with more than delta lobes, at one that reflects

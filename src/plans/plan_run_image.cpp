@@ -33,12 +33,11 @@ constexpr double kEstimateOfInterrupted = 0.5;  // seconds allowed for it; after
 }  // namespace
 
 EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows, std::span<const Film> layers) const {
-  std::array<Image, 5> images;
+  std::array<Image, feature::kCount> images;
   ExtraInputs beside{features(), {}};
-  Features& g = beside.features;
-  for (size_t i = 0;
-       const Image** guide : {&g.albedo, &g.normal, &g.denoising_albedo, &g.denoising_normal, &g.position})
-    if (*guide) images[i] = rows_of(**guide, first_row, n_rows), *guide = &images[i++];
+  for (size_t i = 0; i < feature::kCount; ++i)
+    if (const Image*& image = beside.features.*kImagesOfFeatures[i])
+      images[i] = rows_of(*image, first_row, n_rows), image = &images[i];
   for (size_t i = 0; i < layers.size(); ++i)
     beside.layers.push_back({layer_names_[i], rows_of(layers[i], first_row, n_rows)});
   const Pass* light = light_pass(state_.passes);

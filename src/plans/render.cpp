@@ -78,11 +78,12 @@ const Pass& PlanState::pass(const std::string& name, uint32_t number) const {
 Image RenderResult::picture() const { return image.estimate.data.empty() ? preview_of(passes) : image.estimate; }
 
 Features features_among(const std::map<std::string, Image>& aovs) {
-  const auto find = [&](const char* name) {
-    const auto found = aovs.find(name);
-    return found == aovs.end() ? nullptr : &found->second;
-  };
-  return {find("Albedo"), find("N"), find("DenoisingAlbedo"), find("DenoisingNormal"), find("P"), true};
+  Features features;
+  for (size_t i = 0; i < feature::kCount; ++i)
+    if (const auto found = aovs.find(kAuxiliaryFeatures[i].layer); found != aovs.end())
+      features.*kImagesOfFeatures[i] = &found->second;
+  features.clean = true;
+  return features;
 }
 
 Sampler sampler_of(const LoadedScene& scene, const RenderRequest& request) {
