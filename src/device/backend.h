@@ -2,6 +2,7 @@
 // What a driver does for device.h. One object per opened device.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -20,6 +21,12 @@ struct Argument {
   uint64_t buffer = 0;          ///< as allocate() returned it
   const void* value = nullptr;  ///< valid until launch() returns
   size_t bytes = 0;             ///< of the value or the local memory
+};
+
+/// Work groups first … first + groups - 1 of `items` items each, in three dimensions; as if those before were part of
+/// the same launch.
+struct Grid {
+  std::array<uint32_t, 3> first = {}, groups = {1, 1, 1}, items = {1, 1, 1};
 };
 
 class Backend {
@@ -42,9 +49,7 @@ class Backend {
   virtual void unload(uint64_t program) noexcept = 0;
   /// Valid as long as the program.
   virtual uint64_t kernel(uint64_t program, const std::string& name) = 0;
-  /// `groups` work groups of `items` items each, in three dimensions.
-  virtual void launch(uint64_t kernel, const uint32_t (&groups)[3], const uint32_t (&items)[3],
-                      std::span<const Argument> arguments) = 0;
+  virtual void launch(uint64_t kernel, const Grid& grid, std::span<const Argument> arguments) = 0;
 };
 
 /// Devices of one interface and how to open them. Empty without a driver; `why` then says what is missing.

@@ -37,6 +37,7 @@ Loaded<Driver> load_driver() {
   library.bind("cuModuleLoadData", d.load, why);
   library.bind("cuModuleUnload", d.unload, why);
   library.bind("cuModuleGetFunction", d.get_function, why);
+  library.bind("cuModuleGetGlobal_v2", d.get_global, why);
   library.bind("cuFuncSetAttribute", d.set_attribute, why);
   library.bind("cuLaunchKernel", d.launch, why);
   library.bind("cuGetErrorName", d.error_name, why);

@@ -19,7 +19,8 @@ typedef unsigned long long Address;
 
 constexpr int kSuccess = 0, kOutOfMemory = 2, kNotInitialised = 3;
 // cuDeviceGetAttribute
-constexpr int kLargestGroup = 1, kLocalMemory = 8, kUnits = 16, kMajor = 75, kMinor = 76, kLocalMemoryOnRequest = 97;
+constexpr int kLargestGroup = 1, kLocalMemory = 8, kUnits = 16, kTimeLimit = 17, kMajor = 75, kMinor = 76,
+              kLocalMemoryOnRequest = 97;
 constexpr int kLocalMemoryAttribute = 8;  // cuFuncSetAttribute: bytes of local memory that a launch may give
 
 struct Driver {
@@ -43,6 +44,7 @@ struct Driver {
   int (*load)(Module*, const void*);
   int (*unload)(Module);
   int (*get_function)(Function*, Module, const char*);
+  int (*get_global)(Address*, size_t*, Module, const char*);
   int (*set_attribute)(Function, int what, int value);
   int (*launch)(Function, unsigned, unsigned, unsigned, unsigned, unsigned, unsigned, unsigned local_memory, Stream,
                 void** arguments, void** extra);

@@ -2,6 +2,9 @@
 // Devices of CUDA, by the driver's interface alone; kernels are compiled by NVRTC.
 #include <fmt/format.h>
 
+#include <array>
+#include <map>
+
 #include "device/backend.h"
 #include "device/cuda_api.h"
 
@@ -32,6 +35,7 @@ DeviceInfo info_of(const Driver& cu, int number) {
       std::max(attribute(cu, kLocalMemory, device), attribute(cu, kLocalMemoryOnRequest, device)));
   info.largest_group = static_cast<uint32_t>(attribute(cu, kLargestGroup, device));
   info.units = static_cast<uint32_t>(attribute(cu, kUnits, device));
+  info.stops_long_work = attribute(cu, kTimeLimit, device) != 0;
   int version = 0, major = 0, minor = 0;
   cu.version(&version);
   if (const Compiler* nvrtc = compiler(nullptr)) nvrtc->version(&major, &minor);
@@ -94,23 +98,30 @@ class CudaBackend final : public Backend {
     enter();
     Module module = nullptr;
     check(cu_.load(&module, binary.data()), "cuModuleLoadData");
-    return reinterpret_cast<uintptr_t>(module);
+    const uint64_t program = reinterpret_cast<uintptr_t>(module);
+    size_t size = 0;
+    FirstGroup& first = first_groups_[program];
+    if (cu_.get_global(&first.address, &size, module, "first_group") != kSuccess) first_groups_.erase(program);
+    return program;
   }
   void unload(uint64_t program) noexcept override {
     cu_.set_context(context_);
     cu_.unload(reinterpret_cast<Module>(static_cast<uintptr_t>(program)));
+    first_groups_.erase(program);
   }
   uint64_t kernel(uint64_t program, const std::string& name) override {
     enter();
     Function function = nullptr;
     check(cu_.get_function(&function, reinterpret_cast<Module>(static_cast<uintptr_t>(program)), name.c_str()),
           "kernel " + name);
-    return reinterpret_cast<uintptr_t>(function);
+    const uint64_t kernel = reinterpret_cast<uintptr_t>(function);
+    programs_[kernel] = program;
+    return kernel;
   }
 
-  void launch(uint64_t kernel, const uint32_t (&groups)[3], const uint32_t (&items)[3],
-              std::span<const Argument> arguments) override {
+  void launch(uint64_t kernel, const Grid& grid, std::span<const Argument> arguments) override {
     enter();
+    set_first_group(programs_.at(kernel), grid.first);
     const auto function = reinterpret_cast<Function>(static_cast<uintptr_t>(kernel));
     std::vector<void*> pointers;
     unsigned local_memory = 0;
@@ -124,12 +135,28 @@ class CudaBackend final : public Backend {
     constexpr unsigned kWithoutRequest = 48 << 10;
     if (local_memory > kWithoutRequest)
       check(cu_.set_attribute(function, kLocalMemoryAttribute, static_cast<int>(local_memory)), "cuFuncSetAttribute");
-    check(cu_.launch(function, groups[0], groups[1], groups[2], items[0], items[1], items[2], local_memory, stream_,
-                     pointers.data(), nullptr),
+    check(cu_.launch(function, grid.groups[0], grid.groups[1], grid.groups[2], grid.items[0], grid.items[1],
+                     grid.items[2], local_memory, stream_, pointers.data(), nullptr),
           "cuLaunchKernel");
   }
 
  private:
+  /// The variable first_group of kernels/portable.h.
+  struct FirstGroup {
+    Address address = 0;
+    std::array<uint32_t, 3> value = {};
+  };
+
+  /// Kernels of a source without that variable cannot be launched in parts.
+  void set_first_group(uint64_t program, const std::array<uint32_t, 3>& value) {
+    const auto found = first_groups_.find(program);
+    const bool is_known = found != first_groups_.end();
+    if (value == (is_known ? found->second.value : std::array<uint32_t, 3>{})) return;
+    COVARY_CHECK(is_known, "kernels that are launched in parts include portable.h");
+    write(found->second.address, 0, value.data(), sizeof value);
+    found->second.value = value;
+  }
+
   /// Makes the context that of this thread.
   void enter() { check(cu_.set_context(context_), "cuCtxSetCurrent"); }
 
@@ -146,6 +173,8 @@ class CudaBackend final : public Backend {
   DeviceNumber device_ = 0;
   Context context_ = nullptr;
   Stream stream_ = nullptr;
+  std::map<uint64_t, FirstGroup> first_groups_;  ///< of programs
+  std::map<uint64_t, uint64_t> programs_;        ///< of kernels
 };
 
 }  // namespace

@@ -9,8 +9,10 @@
 #include <optional>
 
 #include "core/content_hash.h"
+#include "core/stopwatch.h"
 #include "device/binary_cache.h"
 #include "device/kernel_source.h"
+#include "device/launch_pace.h"
 
 namespace covary::device {
 
@@ -64,6 +66,7 @@ struct Device::Programs {
   Backend& backend;
   std::map<std::string, uint64_t> loaded;
   std::map<std::pair<uint64_t, std::string>, uint64_t> kernels;
+  std::map<uint64_t, LaunchPace> paces;  ///< of kernels
 };
 
 Device::Device(std::shared_ptr<Backend> backend)
@@ -93,9 +96,30 @@ Kernel Device::kernel_of(const std::string& source, const std::string& name,
 
 void Device::launch_with(const Kernel& kernel, Range global, Range group, std::span<const Argument> arguments) {
   const auto groups = [](uint32_t items, uint32_t in_group) { return (items + in_group - 1) / in_group; };
-  const uint32_t n[3] = {groups(global.x, group.x), groups(global.y, group.y), groups(global.z, group.z)};
-  if (n[0] == 0 || n[1] == 0 || n[2] == 0) return;
-  backend_->launch(kernel.handle, n, {group.x, group.y, group.z}, arguments);
+  const Grid grid{.groups = {groups(global.x, group.x), groups(global.y, group.y), groups(global.z, group.z)},
+                  .items = {group.x, group.y, group.z}};
+  const uint64_t n = uint64_t{grid.groups[0]} * grid.groups[1] * grid.groups[2];
+  if (n == 0) return;
+  constexpr uint32_t kOfUnit = 4;  // groups that a multiprocessor has at first
+  LaunchPace& pace = programs_->paces.try_emplace(kernel.handle, kOfUnit * std::max(info().units, 1u)).first->second;
+  if (!info().stops_long_work || n <= pace.groups()) return backend_->launch(kernel.handle, grid, arguments);
+  launch_in_parts(kernel, grid, pace, arguments);
+}
+
+void Device::launch_in_parts(const Kernel& kernel, const Grid& whole, LaunchPace& pace,
+                             std::span<const Argument> arguments) {
+  const size_t d = whole.groups[2] > 1 ? 2 : whole.groups[1] > 1 ? 1 : 0;
+  const uint32_t of_slice = whole.groups[d == 0 ? 1 : 0] * whole.groups[d == 2 ? 1 : 2];
+  Grid part = whole;
+  backend_->finish();  // what was launched before has its own time
+  for (uint32_t first = 0; first < whole.groups[d]; first += part.groups[d]) {
+    part.first[d] = first;
+    part.groups[d] = std::clamp(pace.groups() / of_slice, 1u, whole.groups[d] - first);
+    const Stopwatch watch;
+    backend_->launch(kernel.handle, part, arguments);
+    backend_->finish();
+    pace.measured(part.groups[d] * of_slice, watch.seconds());
+  }
 }
 
 void Device::finish() { backend_->finish(); }

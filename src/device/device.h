@@ -27,6 +27,8 @@
 
 namespace covary::device {
 
+class LaunchPace;
+
 /// Memory of a device, given back with the object, which keeps the device open. Later buffers of the same size may have
 /// it (memory_pool.h), so its content is undefined at first.
 class RawBuffer {
@@ -142,7 +144,7 @@ class Device {
   Kernel kernel_of(const std::string& source, const std::string& name, const std::vector<std::string>& definitions);
 
   /// Runs at least `global` items, in whole groups of `group` items: kernels check whether an item has work. Arguments
-  /// are buffers, numbers and structs of them, and LocalMemory.
+  /// are buffers, numbers and structs of them, and LocalMemory. Long work is launched in parts (launch_pace.h).
   template <typename... Arguments>
   void launch(const Kernel& kernel, Range global, Range group, const Arguments&... arguments) {
     const std::array<Argument, sizeof...(Arguments)> all{detail::argument(arguments)...};
@@ -156,6 +158,7 @@ class Device {
   void write_bytes(const RawBuffer& to, size_t offset, const void* from, size_t bytes);
   void read_bytes(const RawBuffer& from, size_t offset, void* to, size_t bytes);
   void launch_with(const Kernel& kernel, Range global, Range group, std::span<const Argument> arguments);
+  void launch_in_parts(const Kernel& kernel, const Grid& whole, LaunchPace& pace, std::span<const Argument> arguments);
 
   std::shared_ptr<Backend> backend_;
   std::shared_ptr<MemoryPool> pool_;

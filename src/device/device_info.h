@@ -20,9 +20,10 @@ struct DeviceInfo {
   bool is_processor = false;  ///< the CPU, by OpenCL
   uint64_t memory = 0;        ///< bytes
   uint64_t largest_buffer = 0;
-  uint64_t local_memory = 0;   ///< bytes for a work group
-  uint32_t largest_group = 0;  ///< items
-  uint32_t units = 0;          ///< multiprocessors or cores
+  uint64_t local_memory = 0;    ///< bytes for a work group
+  uint32_t largest_group = 0;   ///< items
+  uint32_t units = 0;           ///< multiprocessors or cores
+  bool stops_long_work = true;  ///< its driver may stop kernels that take seconds; OpenCL does not tell
 
   std::string id() const;    ///< "cuda:0"
   std::string text() const;  ///< "cuda:0 (NVIDIA H100)"

@@ -4,9 +4,13 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <numeric>
+#include <thread>
 
+#include "device/kernel_source.h"
 #include "device/opencl_api.h"
+#include "device/wrapped_backend.h"
 #include "support/files.h"
 
 namespace covary::device {
@@ -86,6 +90,73 @@ TEST(Device, WritesAndReadsParts) {
   EXPECT_EQ(part, (std::vector<int>{2, 30, 40}));
   EXPECT_THROW(device.write(buffer, std::vector<int>(2), 4), Error);
   EXPECT_TRUE(device.make<float>(0));
+}
+
+/// A device that is slow, for each work group.
+class SlowBackend final : public test_support::WrappedBackend {
+ public:
+  explicit SlowBackend(double seconds_per_group, std::vector<Grid>& launches)
+      : seconds_per_group_(seconds_per_group), launches_(launches) {}
+  void launch(uint64_t kernel, const Grid& grid, std::span<const Argument> arguments) override {
+    WrappedBackend::launch(kernel, grid, arguments);
+    const uint32_t n = grid.groups[0] * grid.groups[1] * grid.groups[2];
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds_per_group_ * n));
+    launches_.push_back(grid);
+  }
+
+ private:
+  const double seconds_per_group_;
+  std::vector<Grid>& launches_;
+};
+
+/// Each item writes its place, one more than what was there.
+constexpr const char* kPlaces = R"(
+KERNEL places(int width, int height, GLOBAL int* result) {
+  const int x = get_group_id(0) * get_local_size(0) + get_local_id(0), y = get_global_id(1), z = get_global_id(2);
+  if (x >= width || y >= height) return;
+  const int i = (z * height + y) * width + x;
+  result[i] += 1 + i + 1000 * (x - get_global_id(0));
+})";
+
+/// The same result in parts, none of which takes long.
+TEST(Device, LaunchesLongWorkInParts) {
+  struct Size {
+    int x, y, z;
+    size_t axis;
+  };
+  for (const auto& [x, y, z, axis] : {Size{4000, 1, 1, 0}, {40, 50, 1, 1}, {10, 5, 20, 2}}) {
+    std::vector<Grid> launches;
+    Device device(std::make_shared<SlowBackend>(1e-3, launches));
+    const auto n = static_cast<size_t>(x) * y * z;
+    const auto result = device.upload(std::span<const int>(std::vector<int>(n)));
+    const Kernel kernel = device.kernel_of(kernel_source("portable.h") + kPlaces, "places", {});
+    const auto size = [](int items) { return static_cast<uint32_t>(items); };
+    device.launch(kernel, {size(x), size(y), size(z)}, {8, 1, 1}, x, y, result);
+    EXPECT_EQ(device.download(result), [&] {
+      std::vector<int> expected(n);
+      std::iota(expected.begin(), expected.end(), 1);
+      return expected;
+    }());
+    ASSERT_GT(launches.size(), 2u);
+    uint32_t next = 0;
+    for (const Grid& part : launches) {
+      EXPECT_EQ(part.first[axis], next);
+      EXPECT_LE(part.groups[0] * part.groups[1] * part.groups[2], 110u);  // 0.11 s
+      next += part.groups[axis];
+    }
+  }
+}
+
+TEST(Device, LaunchesShortWorkAtOnce) {
+  std::vector<Grid> launches;
+  Device device(std::make_shared<SlowBackend>(0, launches));
+  const auto result = device.make<int>(4000);
+  const Kernel kernel = device.kernel_of(kernel_source("portable.h") + kPlaces, "places", {});
+  for (int run = 0; run < 8; ++run) {
+    launches.clear();
+    device.launch(kernel, {4000}, {8}, 4000, 1, result);
+  }
+  EXPECT_EQ(launches.size(), 1u);
 }
 
 TEST(Device, UsesMemoryAgain) {

@@ -160,8 +160,7 @@ class OpenClBackend final : public Backend {
     return number_of(kernel);
   }
 
-  void launch(uint64_t kernel, const uint32_t (&groups)[3], const uint32_t (&items)[3],
-              std::span<const Argument> arguments) override {
+  void launch(uint64_t kernel, const Grid& grid, std::span<const Argument> arguments) override {
     const KernelObject object = handle_of<KernelObject>(kernel);
     for (uint32_t i = 0; i < arguments.size(); ++i) {
       const Argument& a = arguments[i];
@@ -170,12 +169,14 @@ class OpenClBackend final : public Backend {
       check(cl_.set_argument(object, i, is_buffer ? sizeof memory : a.bytes, is_buffer ? &memory : a.value),
             fmt::format("argument {} of a kernel", i));
     }
-    size_t global[3], local[3];
-    for (int d = 0; d < 3; ++d) {
-      local[d] = items[d];
-      global[d] = size_t{groups[d]} * items[d];
+    std::array<size_t, 3> offset, global, local;
+    for (size_t d = 0; d < 3; ++d) {
+      local[d] = grid.items[d];
+      global[d] = size_t{grid.groups[d]} * grid.items[d];
+      offset[d] = size_t{grid.first[d]} * grid.items[d];
     }
-    check(cl_.launch(queue_, object, 3, nullptr, global, local, 0, nullptr, nullptr), "clEnqueueNDRangeKernel");
+    check(cl_.launch(queue_, object, 3, offset.data(), global.data(), local.data(), 0, nullptr, nullptr),
+          "clEnqueueNDRangeKernel");
   }
 
  private:

@@ -18,9 +18,6 @@ namespace {
 using device::Buffer;
 using device::Device;
 
-/// Pixels whose systems are solved in one launch: seconds of a slow device, which display drivers do not tolerate.
-constexpr int kPixelsAtOnce = 1 << 17;
-
 std::vector<int> flat_offsets(int window) {
   std::vector<int> flat;
   for (const Offset& o : window_offsets(window)) {
@@ -154,13 +151,9 @@ class Variates {
                                                {"SYMMETRIC", s_.symmetric},
                                                {"STD_ERROR", s_.std_error}}));
       constexpr uint32_t kItems = 32;  // LANES
-      const int rows = std::max(1, kPixelsAtOnce / crn_.width);
-      for (int y = 0; y < crn_.height; y += rows)
-        device_.launch(
-            kernel,
-            {kItems * static_cast<uint32_t>(crn_.width), static_cast<uint32_t>(std::min(rows, crn_.height - y))},
-            {kItems}, records_, guide_, other_, chosen_, offsets_, crn_.width, crn_.height, y, s_.sample_fraction,
-            s_.mean_constraint, s_.ridge, estimate_, std_error_);
+      device_.launch(kernel, {kItems * static_cast<uint32_t>(crn_.width), static_cast<uint32_t>(crn_.height)}, {kItems},
+                     records_, guide_, other_, chosen_, offsets_, crn_.width, crn_.height, s_.sample_fraction,
+                     s_.mean_constraint, s_.ridge, estimate_, std_error_);
     });
   }
 

@@ -6,6 +6,7 @@
 
 #include <limits>
 
+#include "device/wrapped_backend.h"
 #include "estimators/iicv.h"
 #include "estimators/test_images.h"
 #include "gpu/agreement.h"
@@ -15,49 +16,48 @@
 namespace covary::gpu {
 namespace {
 
-using device::Argument, device::Backend, device::Device, device::Failure, device::FailureKind;
+using device::Argument, device::Device, device::Failure, device::FailureKind;
 using test_support::contains, test_support::message_of;
 
 enum class Fault { kNone, kCompile, kMemory, kLost, kNoNumbers };
 
-/// The device of the tests with a fault.
-class FaultyBackend final : public Backend {
+/// The device of the tests with a fault, after so many launches.
+class FaultyBackend final : public test_support::WrappedBackend {
  public:
-  explicit FaultyBackend(Fault fault) : fault_(fault), real_(device::open_opencl(0)) {}
-  const device::DeviceInfo& info() const override { return real_->info(); }
+  explicit FaultyBackend(Fault fault, int launches_before = 0) : fault_(fault), launches_left_(launches_before) {}
   uint64_t allocate(size_t bytes) override {
-    if (fault_ == Fault::kMemory) throw Failure(FailureKind::kMemory, "the device is full");
-    return real_->allocate(bytes);
-  }
-  void release(uint64_t buffer) noexcept override { real_->release(buffer); }
-  void write(uint64_t buffer, size_t offset, const void* from, size_t bytes) override {
-    real_->write(buffer, offset, from, bytes);
+    if (has(Fault::kMemory)) throw Failure(FailureKind::kMemory, "the device is full");
+    return WrappedBackend::allocate(bytes);
   }
   void read(uint64_t buffer, size_t offset, void* to, size_t bytes) override {
-    real_->read(buffer, offset, to, bytes);
-    if (fault_ == Fault::kNoNumbers && bytes >= sizeof(float))
+    WrappedBackend::read(buffer, offset, to, bytes);
+    if (has(Fault::kNoNumbers) && bytes >= sizeof(float))
       *static_cast<float*>(to) = std::numeric_limits<float>::quiet_NaN();
   }
-  void finish() override { real_->finish(); }
+  void finish() override {
+    check_lost();
+    WrappedBackend::finish();
+  }
   std::string compile(const std::string& source, const std::vector<std::string>& definitions) override {
-    if (fault_ == Fault::kCompile) return real_->compile("no kernel", definitions);
-    return real_->compile(source, definitions);
+    return WrappedBackend::compile(has(Fault::kCompile) ? "no kernel" : source, definitions);
   }
   uint64_t load(const std::string& binary) override {
-    if (fault_ == Fault::kCompile) throw Failure(FailureKind::kCompile, "a binary of another driver");
-    return real_->load(binary);
+    if (has(Fault::kCompile)) throw Failure(FailureKind::kCompile, "a binary of another driver");
+    return WrappedBackend::load(binary);
   }
-  void unload(uint64_t program) noexcept override { real_->unload(program); }
-  uint64_t kernel(uint64_t program, const std::string& name) override { return real_->kernel(program, name); }
-  void launch(uint64_t kernel, const uint32_t (&groups)[3], const uint32_t (&items)[3],
-              std::span<const Argument> arguments) override {
-    if (fault_ == Fault::kLost) throw Failure(FailureKind::kLost, "the device has fallen off the bus");
-    real_->launch(kernel, groups, items, arguments);
+  void launch(uint64_t kernel, const device::Grid& grid, std::span<const Argument> arguments) override {
+    check_lost();
+    WrappedBackend::launch(kernel, grid, arguments);
+    --launches_left_;
   }
 
  private:
+  bool has(Fault fault) const { return fault_ == fault && launches_left_ <= 0; }
+  void check_lost() const {
+    if (has(Fault::kLost)) throw Failure(FailureKind::kLost, "the device has fallen off the bus");
+  }
   const Fault fault_;
-  const std::unique_ptr<Backend> real_;
+  int launches_left_;
 };
 
 struct Pair {
@@ -78,8 +78,8 @@ MethodImage image_of(const Method& method, const Pair& in) {
   return method.image({in.crn.view(), in.independent.view()}, settings);
 }
 
-std::shared_ptr<Target> faulty(Fault fault, bool is_automatic) {
-  return std::make_shared<Target>(Device(std::make_shared<FaultyBackend>(fault)), is_automatic);
+std::shared_ptr<Target> faulty(Fault fault, bool is_automatic, int launches_before = 0) {
+  return std::make_shared<Target>(Device(std::make_shared<FaultyBackend>(fault, launches_before)), is_automatic);
 }
 
 TEST(Target, RunsAMethodOnADevice) {
@@ -112,6 +112,18 @@ TEST(Target, ProcessorTakesOver) {
       EXPECT_FALSE(contains(found.note, "\n"));
     }
     EXPECT_EQ(target->made_by(), "");
+  }
+}
+
+/// A device that vanishes while it works, with what it has made so far.
+TEST(Target, ProcessorTakesOverInTheMiddle) {
+  const Pair in;
+  const MethodImage expected = image_of(iicv_on(nullptr), in);
+  for (const int launches : {1, 3, 5}) {
+    const MethodImage found = image_of(iicv_on(faulty(Fault::kLost, true, launches)), in);
+    EXPECT_EQ(found.estimate.data, expected.estimate.data) << launches;
+    EXPECT_TRUE(contains(found.note, "fallen off the bus; the processor takes over")) << found.note;
+    EXPECT_THROW(image_of(iicv_on(faulty(Fault::kLost, false, launches)), in), Error) << launches;
   }
 }
 

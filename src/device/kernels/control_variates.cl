@@ -213,12 +213,12 @@ FUNCTION float squared_error(const Weights* weights, int c, int first, LOCAL con
   return of_crn + ((1.0f - fraction) * own + fraction * squares * variances / fmax(count, 1.0f));
 }
 
-// `chosen`, `offsets`: of nearest.cl. `guide`, `other`: of pair_moments.cl. Rows from `first_row` on; a work group for
-// each pixel. Results: three floats a pixel.
+// `chosen`, `offsets`: of nearest.cl. `guide`, `other`: of pair_moments.cl. A work group for each pixel. Results: three
+// floats a pixel.
 KERNEL control_variates(GLOBAL const float* RESTRICT records, GLOBAL const float* RESTRICT guide,
                         GLOBAL const float* RESTRICT other, GLOBAL const ushort* RESTRICT chosen,
-                        GLOBAL const int* RESTRICT offsets, int width, int height, int first_row,
-                        float sample_fraction, float mean_constraint, float ridge, GLOBAL float* RESTRICT estimate,
+                        GLOBAL const int* RESTRICT offsets, int width, int height, float sample_fraction,
+                        float mean_constraint, float ridge, GLOBAL float* RESTRICT estimate,
                         GLOBAL float* RESTRICT std_error) {
   LOCAL_ARRAY(float, X, X_SIZE);
   LOCAL_ARRAY(float, A, PADDED(VECTORS) * FACTOR_PITCH);
@@ -233,7 +233,7 @@ KERNEL control_variates(GLOBAL const float* RESTRICT records, GLOBAL const float
   LOCAL_ARRAY(int, at, K + 1);
   Weights weights;
   weights.sample_fraction = sample_fraction, weights.mean_constraint = mean_constraint, weights.ridge = ridge;
-  const int x = get_group_id(0), y = get_group_id(1) + first_row, lane = get_local_id(0), pixel = y * width + x;
+  const int x = get_group_id(0), y = get_group_id(1), lane = get_local_id(0), pixel = y * width + x;
   for (int i = lane; i <= K; i += LANES) {
     const int o = i < K ? chosen[(size_t)i * width * height + pixel] : 0;
     const int qx = x + offsets[2 * o], qy = y + offsets[2 * o + 1];

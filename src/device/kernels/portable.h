@@ -11,6 +11,7 @@
 //   group_barrier()                     orders the local memory of the work group
 //   FLOAT4(a, b, c, d)                  a vector
 //   TABLE float t[] = {…};              constants of a kernel file
+//   get_group_id(), get_global_id()     count over all launches of a long one that is made in parts (launch_pace.h)
 //   UNROLL                              before a loop whose number of steps is constant
 //
 // PLANTED_BUG is 0 but in tests, whose comparisons must notice a kernel that is slightly wrong.
@@ -36,12 +37,13 @@
 typedef unsigned int uint;
 typedef unsigned short ushort;
 typedef unsigned char uchar;
-FUNCTION int get_group_id(int d) { return d == 0 ? blockIdx.x : d == 1 ? blockIdx.y : blockIdx.z; }
+extern "C" __constant__ int first_group[3] = {0, 0, 0};  // set by cuda_backend.cpp
+FUNCTION int get_group_id(int d) {
+  return first_group[d] + (d == 0 ? blockIdx.x : d == 1 ? blockIdx.y : blockIdx.z);
+}
 FUNCTION int get_local_id(int d) { return d == 0 ? threadIdx.x : d == 1 ? threadIdx.y : threadIdx.z; }
 FUNCTION int get_local_size(int d) { return d == 0 ? blockDim.x : d == 1 ? blockDim.y : blockDim.z; }
-FUNCTION int get_num_groups(int d) { return d == 0 ? gridDim.x : d == 1 ? gridDim.y : gridDim.z; }
 FUNCTION int get_global_id(int d) { return get_group_id(d) * get_local_size(d) + get_local_id(d); }
-FUNCTION int get_global_size(int d) { return get_num_groups(d) * get_local_size(d); }
 FUNCTION void group_barrier() { __syncthreads(); }
 FUNCTION int as_int(float v) { return __float_as_int(v); }
 FUNCTION float as_float(int v) { return __int_as_float(v); }
@@ -61,6 +63,8 @@ FUNCTION void vstore4(float4 v, int i, float* p) { ((float4*)p)[i] = v; }
 #define UNROLL __attribute__((opencl_unroll_hint))
 #define FLOAT4(a, b, c, d) ((float4)(a, b, c, d))
 #define group_barrier() barrier(CLK_LOCAL_MEM_FENCE)
+FUNCTION int group_of_all(int d) { return (int)(get_group_id(d) + get_global_offset(d) / get_local_size(d)); }
+#define get_group_id(d) group_of_all(d)
 #endif
 
 // 2^x for x <= 0; 0 below -126, and for NaN.
