@@ -17,7 +17,7 @@
 #include "denoising/mixing_memory.h"
 #include "denoising/mixture_name.h"
 #include "denoising/network_memory.h"
-#include "denoising/rows_denoising.h"
+#include "denoising/row_bands.h"
 #include "estimators/mean.h"
 #include "estimators/result_rows.h"
 #include "filters/planes.h"

@@ -94,10 +94,14 @@ Method with_denoising(const Method& base, const DenoisingChoice& choice, const M
   options.use_oidn = choice.oidn != "off";
   if (options.use_oidn) options.oidn.library = choice.oidn;
   options.history = choice.history;
-  if (target)
+  if (target) {
+    options.mix_pair = [target](const PairMixture& request, const std::function<MixedDenoising()>& here) {
+      return target->run([&](device::Device& device) { return gpu::mix_pair(device, request); }, here);
+    };
     options.mix_mean = [target](const MeanMixture& request, const std::function<MixedDenoising()>& here) {
       return target->run([&](device::Device& device) { return gpu::mix_mean(device, request); }, here);
     };
+  }
   return with_denoising(base, options);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A mixture of the mean of independent samples with denoised images, for those that make it elsewhere than on the
-// processor: what it is made of.
+// A mixture of an image with denoised images, for those that make it elsewhere than on the processor: what it is made
+// of.
 #pragma once
 
 #include <array>
@@ -21,6 +21,14 @@ struct MeanMixture {
   std::function<NetworkImages(std::array<Image, 3> noisy)> network;
   bool std_error = false;  ///< estimate the result's error
   bool stages = false;     ///< candidates and weights are wanted, too
+};
+
+/// The image of an estimator of two passes; without residual correction.
+struct PairMixture {
+  const DenoisingParts* parts = nullptr;  ///< with features
+  PartsWeighting weighting;
+  std::function<NetworkImages()> network;  ///< of the independent images; their candidate comes last; empty: without
+  bool std_error = false, stages = false;  ///< as for a mean
 };
 
 }  // namespace covary

@@ -11,6 +11,7 @@
 
 #include "core/error.h"
 #include "denoising/denoise.h"
+#include "denoising/frame_history.h"
 #include "denoising/layers.h"
 #include "denoising/mean_mixture.h"
 #include "denoising/mixed_rows.h"
@@ -76,48 +77,6 @@ DenoiseMode denoise_mode(const std::string& name) {
   throw Error(ErrorCode::kUsage,
               fmt::format("`denoise` '{}': expected {}", name, fmt::join(denoise_mode_names(), ", ")));
 }
-
-namespace {
-
-/// The mixture of independent samples whose halves have these means.
-Mixture mixture_of_halves(const std::array<Image, 2>& halves, const std::vector<CandidateMaker>& makers,
-                          const PartsWeighting& chosen) {
-  GroupedImage groups{halves[0].width, halves[0].height, 2};
-  std::vector<float> data;
-  data.reserve(2 * halves[0].data.size());
-  for (size_t i = 0; i < halves[0].data.size(); i += 3)
-    for (const Image& half : halves) data.insert(data.end(), &half.data[i], &half.data[i] + 3);
-  groups.data = data.data();
-  return mix_parts(parts_of_mean(groups), makers, chosen).mixture;
-}
-
-/// Mixes in the history, and keeps samples for the next frame if a network denoises: filtered from reprojected samples,
-/// a region of a frame with a moving camera had 1.65 times the error of the frame alone.
-void use_history(const MixingHistory& use, const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
-                 const PartsWeighting& chosen, const Image& frame_error, MixedParts& mixed,
-                 std::vector<Image>& kept_samples) {
-  const Image& guide = guide_of(mixed.whole);
-  HistoryInput input{
-      {&parts.halves[0].independent, &parts.halves[1].independent}, &frame_error, &guide, &parts.valid, {}, nullptr};
-  const Image common_counts = use.before ? counts_of(*use.before, guide) : Image();
-  input.common_counts = &common_counts;
-  for (const int half : {0, 1})
-    if (parts.is_mean) input.counts[half] = &mixed.counts[half];
-  std::array<Image, 2> halves = {parts.halves[0].image.estimate, parts.halves[1].image.estimate};
-  std::optional<Mixture> accumulated;
-  const bool uses_samples = parts.is_mean && has_network(makers);
-  if (use.before && uses_samples && !use.before->samples[0].data.empty()) {
-    Image mean = parts.whole.image.estimate;
-    add_samples(*use.before, input, mean, halves);
-    accumulated = mixture_of_halves(halves, makers, chosen);
-  }
-  if (use.before) add_history(*use.before, input, accumulated ? &*accumulated : nullptr, mixed.mixture);
-  if (!use.keep_samples) return;
-  kept_samples.assign(kKeptSamples.size(), Image());
-  if (uses_samples) std::move(halves.begin(), halves.end(), kept_samples.begin());
-}
-
-}  // namespace
 
 MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<CandidateMaker>& makers, DenoiseMode mode,
                                   bool std_error, std::span<const Layer> layers, const MixingHistory& history) {
@@ -193,8 +152,19 @@ MixedDenoising denoise_frame(DenoisingParts parts, const std::vector<CandidateMa
   return out;
 }
 
+bool has_history(const MixedDenoisingOptions& options) {
+  return options.history.before || options.history.keep_samples;
+}
+
+/// Tells what is not made elsewhere although options.mix_mean is given.
+void tell_that_made_here(const MixedDenoisingOptions& options, const char* what, MethodImage& result) {
+  if (!options.mix_mean) return;
+  result.note +=
+      fmt::format("{}{} are denoised on the processor, not on the device", result.note.empty() ? "" : "; ", what);
+}
+
 Run run_of_pair(const Method& base, const MixedDenoisingOptions& options, bool with_oidn) {
-  return [=](const Samples& samples, const MethodSettings& settings, bool /*stages*/) {
+  return [=](const Samples& samples, const MethodSettings& settings, bool stages) {
     check_features(settings.features);
     const auto& [crn, independent] = samples;
     if (std::min(crn.groups, independent.groups) < 2 * base.min_groups) {
@@ -205,13 +175,30 @@ Run run_of_pair(const Method& base, const MixedDenoisingOptions& options, bool w
                       2 * base.min_groups, base.text);
       return out;
     }
-    std::vector<CandidateMaker> makers = {filtered_candidates(settings.features)};
-    if (with_oidn) makers.push_back(neural_candidates(settings.features, options.oidn));
-    return denoise_frame(parts_of_pair(base, crn, independent, settings), makers, options, settings, {});
+    DenoisingParts parts = parts_of_pair(base, crn, independent, settings);
+    parts.features = settings.features;
+    const auto here = [&] {
+      std::vector<CandidateMaker> makers = {filtered_candidates(settings.features)};
+      if (with_oidn) makers.push_back(neural_candidates(settings.features, options.oidn));
+      return denoise_frame(std::move(parts), makers, options, settings, {});
+    };
+    const PartsWeighting weighting = settings_of(options.mode).weighting;
+    if (!options.mix_pair || has_history(options) || weighting.residual_correction) {
+      MixedDenoising out = here();
+      tell_that_made_here(options, has_history(options) ? "frames with a history" : "images of a pair with less bias",
+                          out.result);
+      return out;
+    }
+    PairMixture request{&parts, weighting, {}, settings.std_error, stages};
+    if (with_oidn)
+      request.network = [&] {
+        return network_images(settings.features, options.oidn,
+                              {mean_image(parts.whole.independent), mean_image(parts.halves[0].independent),
+                               mean_image(parts.halves[1].independent)});
+      };
+    return options.mix_pair(request, here);
   };
 }
-
-constexpr const char* kMixedHere = "layers, history and pictures of very few samples are denoised on the processor";
 
 Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
   return [=](const Samples& samples, const MethodSettings& settings, bool stages) {
@@ -227,10 +214,12 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
       return denoise_frame(parts_of_mean(independent), makers, options, settings, settings.layers);
     };
     if (!options.mix_mean) return here();
-    const bool has_history = options.history.before || options.history.keep_samples;
-    if (has_history || !settings.layers.empty() || !can_be_mixed(independent)) {
+    if (has_history(options) || !settings.layers.empty() || !can_be_mixed(independent)) {
       MixedDenoising out = here();
-      out.result.note += out.result.note.empty() ? kMixedHere : fmt::format("; {}", kMixedHere);
+      const char* const what = has_history(options)      ? "frames with a history"
+                               : settings.layers.empty() ? "images of very few samples"
+                                                         : "images with layers";
+      tell_that_made_here(options, what, out.result);
       return out;
     }
     MeanMixture request{independent, settings.features,  kinds, settings_of(options.mode).weighting,
@@ -293,9 +282,11 @@ void allow_rows(const Method& base, const MixedDenoisingOptions& options, bool w
   if (with_oidn) rows.network = options.oidn;
   method.reach = rows_reach(rows);
   method.memory.of_whole = bytes_of_whole(with_oidn);
-  method.image_in_rows = [rows](const SamplesInRows& image, const MethodSettings& settings) {
+  method.image_in_rows = [rows, options](const SamplesInRows& image, const MethodSettings& settings) {
     check_features(settings.features);
-    return denoise_in_rows(image, settings, rows);
+    MethodImage result = denoise_in_rows(image, settings, rows);
+    tell_that_made_here(options, "images that are read in parts", result);
+    return result;
   };
 }
 
@@ -375,24 +366,6 @@ Method make_mixture(Settings& options) {
   mean.name = mean.text = kMixture;
   mean.summary = "the mean, with denoised images mixed in";
   return mean;
-}
-
-void declare(Settings& s, DenoisingChoice& v, bool is_all) {
-  s.group("Denoising");
-  s.one_of("denoise", v.mode, denoise_mode_names(),
-           "Mix in denoised images where held-out samples prefer them: for the least error (auto), or with less bias",
-           {.level = OptionLevel::kBasic});
-  s.text("oidn", v.oidn, "off|LIBRARY",
-         std::string(is_all ? "For `denoise`" : "For `denoise` and `cv-variance` relative-oidn") +
-             ": Open Image Denoise's library or its folder; default: searched for; 'off': not used",
-         {.names = OptionNames::kLibrary});
-  s.only_if(v.denoises() || !is_all, {"oidn"}, kNotDenoised);
-}
-
-std::string missing_network(const DenoisingChoice& choice) {
-  if (!choice.uses_oidn() || !choice.oidn.empty() || !find_denoiser().empty()) return "";
-  return "Open Image Denoise is not installed, so only filters denoise the image; `pip install pyoidn` installs it "
-         "(`oidn` off silences this note)";
 }
 
 }  // namespace covary

@@ -38,6 +38,7 @@ enum class DenoiseMode {
 };
 
 struct MeanMixture;     // mean_mixture.h
+struct PairMixture;     // mean_mixture.h
 struct MixedDenoising;  // below
 
 struct MixedDenoisingOptions {
@@ -48,6 +49,8 @@ struct MixedDenoisingOptions {
   /// Makes the mixture of a mean without history and layers elsewhere, such as on a GPU, or by calling `here`; empty:
   /// here.
   std::function<MixedDenoising(const MeanMixture&, const std::function<MixedDenoising()>& here)> mix_mean;
+  /// Same for a pair, without residual correction.
+  std::function<MixedDenoising(const PairMixture&, const std::function<MixedDenoising()>& here)> mix_pair;
 };
 
 /// A method that holds another, whose image it denoises: that of a pair that predicts its error, or the mean. For the

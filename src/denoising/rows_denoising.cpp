@@ -6,32 +6,13 @@
 #include <utility>
 
 #include "denoising/mixed_rows.h"
+#include "denoising/row_bands.h"
 #include "denoising/weighed_candidate.h"
 #include "estimators/result_rows.h"
-#include "filters/regression.h"
-#include "filters/residual_correction.h"
 #include "risk/halves.h"
-#include "weighing/weighing.h"
 
 namespace covary {
 namespace {
-
-static_assert(kBandCell % kResidualCell == 0 && kBandCell % kRegressionCell == 0 && kBandCell % kWeighingRows == 0);
-
-/// Rows of the features.
-struct FeatureRows {
-  std::array<Image, feature::kCount> images;
-  Features features;
-
-  FeatureRows(const Features& whole, int first, int n) {
-    for (size_t i = 0; i < feature::kCount; ++i)
-      if (const Image* image = whole.*kImagesOfFeatures[i])
-        images[i] = rows_of(*image, first, n), features.*kImagesOfFeatures[i] = &images[i];
-    features.clean = whole.clean;
-  }
-  FeatureRows(const FeatureRows&) = delete;
-  FeatureRows& operator=(const FeatureRows&) = delete;
-};
 
 /// Rows first … of the image, which hold the rows that are wanted from row `skipped` on.
 struct Band {
@@ -40,12 +21,6 @@ struct Band {
   FeatureRows features;
   MethodSettings settings;
 };
-
-/// Radius of influence of the image on a pixel of any candidate.
-int candidates_reach(const RowsMethod& method) {
-  return method.reach_of_parts + kCandidateReach +
-         (method.base == CandidateBase::kMean && !method.network ? kWeighingReach : 0);
-}
 
 class RowsDenoising {
  public:
@@ -78,14 +53,11 @@ class RowsDenoising {
   /// Calls f(band, y, n) for bands that hold rows y … y + n - 1 and `reach` more on both sides.
   template <typename Function>
   void for_each_band(int reach, int first, int end, const Function& f) const {
-    const int step = std::max(kBandCell, (image_.rows_at_once - 2 * reach) / kBandCell * kBandCell - kBandCell);
-    for (int y = first; y < end; y += step) {
-      const int n = std::min(step, end - y);
-      const int begin = std::max(0, y - reach) / kBandCell * kBandCell;
-      const int rows = std::min(image_.height, y + n + reach) - begin;
-      Band band{begin, y - begin, image_.rows(begin, rows), FeatureRows(settings_.features, begin, rows), settings_};
+    for (const RowBand& b : bands_of(image_.height, image_.rows_at_once, reach, first, end)) {
+      Band band{b.first, b.skipped, image_.rows(b.first, b.rows), FeatureRows(settings_.features, b.first, b.rows),
+                settings_};
       band.settings.features = band.features.features;
-      f(band, y, n);
+      f(band, b.y, b.n);
     }
   }
 
@@ -149,8 +121,9 @@ class RowsDenoising {
   void find_weights() {
     std::vector<NormalRow> all;
     std::vector<CandidateMaker> makers;
+    const int reach = candidates_reach(method_.base, method_.network.has_value(), method_.reach_of_parts);
     for (const auto& [first, end] : sampled_rows(image_.width, image_.height))
-      for_each_band(candidates_reach(method_), first, end, [&](const Band& band, int, int n) {
+      for_each_band(reach, first, end, [&](const Band& band, int, int n) {
         makers = makers_of(band);
         const std::vector<NormalRow> rows = normal_rows_of(method_.parts(band.rows, band.settings), makers,
                                                            method_.weighting, band.skipped, band.skipped + n);
@@ -191,8 +164,7 @@ class RowsDenoising {
 }  // namespace
 
 int rows_reach(const RowsMethod& method) {
-  const bool is_mean = method.base == CandidateBase::kMean;
-  return candidates_reach(method) + mixture_reach(is_mean, method.weighting) + kErrorReach;
+  return mixed_reach(method.base, method.network.has_value(), method.reach_of_parts, method.weighting);
 }
 
 double bytes_of_whole(bool with_network) {

@@ -32,9 +32,6 @@ struct RowsMethod {
   std::function<bool(const Samples& rows)> are_enough;
 };
 
-/// Bands begin with cells of all kinds, at multiples of so many rows.
-inline constexpr int kBandCell = 24;
-
 /// Radius of influence of the image on a pixel, in rows.
 int rows_reach(const RowsMethod& method);
 

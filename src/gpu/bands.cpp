@@ -10,6 +10,9 @@ namespace {
 /// Fraction of the memory that is used; the rest is for drivers and other programs.
 constexpr double kOfMemory = 0.8;
 
+/// Elements of a buffer that kernels count with an int.
+constexpr double kMaxIndexed = 2147483647;
+
 /// The mean number of samples belongs to the whole image.
 GroupedImage with_mean_count(GroupedImage image) {
   const size_t n = static_cast<size_t>(image.width) * image.height;
@@ -29,7 +32,8 @@ void copy_rows(const Image& from, int skipped, int y, int n, int height, Image& 
 
 int rows_that_fit(const device::DeviceInfo& device, int width, int height, const BandNeeds& needs) {
   const double by_memory = kOfMemory * static_cast<double>(device.memory) / (needs.bytes_per_pixel * width);
-  const double by_buffer = static_cast<double>(device.largest_buffer) / (needs.largest_buffer_per_pixel * width);
+  const double largest = std::min(static_cast<double>(device.largest_buffer), kMaxIndexed * sizeof(float));
+  const double by_buffer = largest / (needs.largest_buffer_per_pixel * width);
   return static_cast<int>(std::min({by_memory, by_buffer, static_cast<double>(height)}));
 }
 

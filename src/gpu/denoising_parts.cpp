@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gpu/denoising_parts.h"
 
+#include <span>
+#include <utility>
+#include <vector>
+
 #include "gpu/launch.h"
 
 namespace covary::gpu {
@@ -46,6 +50,23 @@ Groups upload(Device& device, const GroupedImage& image) {
   result.valid = device.make<unsigned char>(pixels);
   device.launch(kernel(device, "usable_pixels"), list_of(pixels), kOfList, result.data, image.groups, result.pixels(),
                 result.valid);
+  return result;
+}
+
+Buffer<float> upload(Device& device, const Planes& planes) {
+  std::vector<float> values;
+  values.reserve(static_cast<size_t>(planes.width()) * planes.height() * planes.count());
+  for (int y = 0; y < planes.height(); ++y)
+    for (int x = 0; x < planes.width(); ++x)
+      for (int c = 0; c < planes.count(); ++c) values.push_back(planes.row(c, y)[x]);
+  return device.upload(std::span(std::as_const(values)));
+}
+
+PartBuffers upload(Device& device, const DenoisingPart& part) {
+  PartBuffers result;
+  result.independent = {upload(device, part.independent.mean), upload(device, part.independent.variance_of_mean)};
+  result.estimate = device.upload(std::span(part.image.estimate.data));
+  result.std_error = device.upload(std::span(part.image.std_error.data));
   return result;
 }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 
+#include "denoising/denoising_parts.h"
 #include "device/device.h"
 #include "film/grouped_image.h"
 
@@ -57,10 +58,17 @@ struct PartBuffers {
   Buffer<float> std_error;
   /// Without fireflies; empty for a set of one group, which has no other to confirm them.
   Buffer<float> limited, limited_error;
+  Buffer<float> estimate;  ///< the image, if that is not the mean
 
-  const Buffer<float>& noisy() const { return limited ? limited : independent.mean; }
+  const Buffer<float>& image() const { return estimate ? estimate : independent.mean; }
+  const Buffer<float>& noisy() const { return limited ? limited : image(); }
   const Buffer<float>& noisy_error() const { return limited ? limited_error : std_error; }
 };
+
+/// The planes without their border, interleaved.
+Buffer<float> upload(Device& device, const Planes& planes);
+/// The image of an estimator of two passes.
+PartBuffers upload(Device& device, const DenoisingPart& part);
 
 /// All samples and both halves, of two groups or more.
 std::array<PartBuffers, 3> parts_of_mean(Device& device, const Groups& groups);

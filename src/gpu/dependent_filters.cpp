@@ -6,22 +6,13 @@
 #include <array>
 #include <vector>
 
+#include "gpu/denoising_parts.h"
 #include "gpu/launch.h"
 
 namespace covary::gpu {
 namespace {
 
 using device::Buffer, device::Device;
-
-/// The planes without their border, interleaved.
-Buffer<float> upload(Device& device, const Planes& planes) {
-  std::vector<float> values;
-  values.reserve(static_cast<size_t>(planes.width()) * planes.height() * planes.count());
-  for (int y = 0; y < planes.height(); ++y)
-    for (int x = 0; x < planes.width(); ++x)
-      for (int c = 0; c < planes.count(); ++c) values.push_back(planes.row(c, y)[x]);
-  return device.upload(std::span(std::as_const(values)));
-}
 
 device::Kernel kernel(Device& device, const char* name, Falloff falloff, Norm norm, bool planted_bug) {
   return device.kernel("dependent_tests.cl", name,

@@ -45,8 +45,8 @@ SurfaceBuffers FeatureBuffers::surfaces() const {
   return {or_null(normal_), or_null(normal_behind_), or_null(albedo_), or_null(albedo_behind_)};
 }
 
-void filter(Device& device, const Groups& groups, const FeatureBuffers& features, const PartBuffers& part, bool is_half,
-            const Place& results) {
+void filter(Device& device, const Groups& groups, const FeatureBuffers& features, CandidateBase base,
+            const PartBuffers& part, bool is_half, const Place& results) {
   const size_t values = 3 * static_cast<size_t>(groups.pixels());
   size_t next = results.first + (features.features() ? values : 0);  // the regression is the first
   NlMeansInput input{groups.width, groups.height, &part.noisy(), &part.noisy_error(), &groups.valid};
@@ -54,9 +54,15 @@ void filter(Device& device, const Groups& groups, const FeatureBuffers& features
     if (features.albedo()) input.features.push_back({features.albedo(), kAlbedoUnit});
     if (features.normal()) input.features.push_back({features.normal(), kNormalUnit});
     input.bandwidths = {kSharpBandwidth, kSmoothBandwidth};
-    const std::array places = {Place{results.buffer, next}, Place{results.buffer, next + values}};
-    gpu::nl_means(device, input, places);
-    next += 2 * values;
+    const bool is_pair = base == CandidateBase::kPair;
+    const size_t smooth = next + (is_pair ? 2 : 1) * values;
+    gpu::nl_means(device, input, {{Place{results.buffer, next}, Place{results.buffer, smooth}}});
+    if (is_pair) {
+      input.source = &part.independent.mean, input.bandwidths = {kSharpBandwidth};
+      gpu::nl_means(device, input, {{Place{results.buffer, next + values}}});
+      input.source = nullptr;
+    }
+    next = smooth + values;
   }
   if (!features.albedo()) return;
   const Buffer<float> image = demodulated(device, part.noisy(), *features.albedo());

@@ -31,7 +31,7 @@ class FeatureBuffers {
 };
 
 /// Writes the candidates of filter_names() to `results`, one after another. `is_half`: with coarse regression.
-void filter(Device& device, const Groups& groups, const FeatureBuffers& features, const PartBuffers& part, bool is_half,
-            const Place& results);
+void filter(Device& device, const Groups& groups, const FeatureBuffers& features, CandidateBase base,
+            const PartBuffers& part, bool is_half, const Place& results);
 
 }  // namespace covary::gpu

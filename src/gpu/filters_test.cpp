@@ -90,6 +90,19 @@ TEST(GpuNlMeans, IsThatOfTheProcessor) {
     }
 }
 
+/// With the weights of the image.
+TEST(GpuNlMeans, AveragesAnotherImage) {
+  const Scene s;
+  device::Device& device = test_device();
+  const Planes planes = feature_planes({{&s.albedo, 0.07f}});
+  const NlMeansSteering steering{&s.image, &s.std_error, {{0.5f, {&s.albedo}}}};
+  const auto result = device.make<float>(s.image.data.size());
+  NlMeansInput input{kWidth, kHeight, &s.d_image, &s.d_error, &s.d_valid, {{&s.d_albedo, 0.07f}}, {0.5f}};
+  input.source = &s.d_albedo;
+  nl_means(device, input, {{Place{&result}}});
+  EXPECT_TRUE(agree(covary::nl_means({&steering, 1}, &planes, s.valid)[0].data, device.download(result)));
+}
+
 TEST(GpuNlMeans, IsTheSameEveryTime) {
   const Scene s;
   EXPECT_EQ(filtered(s, 2, {0.5f, 1}, false), filtered(s, 2, {0.5f, 1}, false));

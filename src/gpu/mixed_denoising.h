@@ -13,7 +13,12 @@
 namespace covary::gpu {
 
 /// Implements MixedDenoisingOptions::mix_mean. Values agree with the processor's to rounding: 99.9 % of them within
-/// 1e-4 of value + 0.01. Bit-identical on one device. Throws device::Failure, and like the network.
+/// 1e-4 of value + 0.01. Bit-identical on one device. An image that does not fit the device's memory is made in bands
+/// that overlap by the radius of influence, smaller ones if the device has less memory than it tells; they agree with
+/// the whole to rounding. Throws device::Failure, and like the network.
 MixedDenoising mix_mean(device::Device& device, const MeanMixture& request, const Trial& trial = {});
+
+/// Implements MixedDenoisingOptions::mix_pair, of the whole image at once.
+MixedDenoising mix_pair(device::Device& device, const PairMixture& request, const Trial& trial = {});
 
 }  // namespace covary::gpu

@@ -4,15 +4,20 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "combine/registry.h"
+#include "device/wrapped_backend.h"
 #include "estimators/test_images.h"
 #include "gpu/comparison.h"
+#include "gpu/rows_on_device.h"
 #include "gpu/target.h"
 #include "risk/error_interval.h"
 #include "risk/plain_mean.h"
@@ -159,7 +164,120 @@ TEST(GpuMixedDenoising, TimesItsStages) {
                     }};
   mix_mean(test_device(), {image.view(), {}, FilterKinds::kNlMeans, {1, 0, false}, {}, true, false}, trial);
   EXPECT_EQ(stages, (std::vector<std::string>{"copy samples and auxiliary images", "means and errors", "candidates",
-                                              "mixture", "copy picture", "errors, with their copies"}));
+                                              "weights of the whole image", "mixture", "copy picture",
+                                              "errors, with their copies"}));
+}
+
+/// A device of so many bytes, whose allocation number `first_failing` fails, when it is tried again, too.
+class SmallBackend final : public test_support::WrappedBackend {
+ public:
+  SmallBackend(uint64_t memory, int first_failing)
+      : info_(WrappedBackend::info()), left_(memory), first_failing_(first_failing) {
+    info_.memory = memory;
+  }
+  const device::DeviceInfo& info() const override { return info_; }
+  uint64_t allocate(size_t bytes) override {
+    const int number = n_++;
+    if (bytes > left_ || number == first_failing_ || number == first_failing_ + 1)
+      throw device::Failure(device::FailureKind::kMemory, "the device is full");
+    const uint64_t buffer = WrappedBackend::allocate(bytes);
+    left_ -= sizes_[buffer] = bytes;
+    return buffer;
+  }
+  void release(uint64_t buffer) noexcept override {
+    left_ += sizes_[buffer];
+    WrappedBackend::release(buffer);
+  }
+
+ private:
+  device::DeviceInfo info_;
+  uint64_t left_;
+  const int first_failing_;
+  int n_ = 0;
+  std::map<uint64_t, uint64_t> sizes_;
+};
+
+/// A picture that is higher than bands and what they overlap by.
+struct HighPicture {
+  static constexpr int kHigh = 470, kNarrow = 12;
+  Image albedo = Image(kNarrow, kHigh, 3), normal = albedo;
+  test::Grouped image = test::noisy_image(kNarrow, kHigh, 6, 31, 1);
+  Features features{&albedo, &normal};
+
+  HighPicture() {
+    for (int y = 0; y < kHigh; ++y)
+      for (int x = 0; x < kNarrow; ++x)
+        for (int c = 0; c < 3; ++c) {
+          albedo.pixel(x, y)[c] = 0.4f + 0.3f * test::noise(4, static_cast<uint64_t>(x / 8 + y / 8 * 100), c);
+          normal.pixel(x, y)[c] = x + y % 50 > 30 ? 0.3f : -0.6f;
+        }
+    image.pixel(5, 200)[0] = std::numeric_limits<float>::infinity();
+  }
+  MeanMixture request(bool with_network = false) const {
+    MeanMixture mixture{image.view(), features, kinds_of_mean(with_network), {1, 1, false}, {}, true, true};
+    if (with_network)
+      mixture.network = [](const std::array<Image, 3>& noisy) {
+        return NetworkImages{{blurred(noisy[0]), blurred(noisy[1]), blurred(noisy[2])}, 3};
+      };
+    return mixture;
+  }
+};
+
+void expect_like_whole(const MixedDenoising& whole, const MixedDenoising& bands) {
+  EXPECT_TRUE(agree(whole.result.estimate.data, bands.result.estimate.data));
+  EXPECT_TRUE(agree(whole.result.std_error.data, bands.result.std_error.data));
+  EXPECT_TRUE(agree(whole.result.bias.data, bands.result.bias.data));
+  EXPECT_EQ(bands.result.nonfinite_pixels, 1);
+  EXPECT_EQ(whole.result.network_runs, bands.result.network_runs);
+  ASSERT_EQ(whole.names, bands.names);
+  for (size_t i = 0; i < whole.names.size(); ++i) {
+    EXPECT_TRUE(agree(whole.candidates[i].data, bands.candidates[i].data)) << whole.names[i];
+    EXPECT_TRUE(agree(whole.weights[i].data, bands.weights[i].data)) << whole.names[i];
+  }
+}
+
+TEST(GpuMixedDenoising, WorksInBands) {
+  const HighPicture p;
+  for (const bool with_network : {false, true}) {
+    SCOPED_TRACE(with_network);
+    std::vector<std::string> stages;
+    const Trial bands{"", with_network ? 340 : 440, [&](const std::string& stage, double) { stages.push_back(stage); }};
+    const MeanMixture request = p.request(with_network);
+    expect_like_whole(mix_mean(test_device(), request), mix_mean(test_device(), request, bands));
+    EXPECT_GE(std::ranges::count(stages, "mixture"), 2);
+    EXPECT_EQ(std::ranges::count(stages, "network"), with_network ? 1 : 0);
+  }
+}
+
+/// The mixture by a device of so many bytes, and the number of bands.
+std::pair<MixedDenoising, int> mixed_by(const MeanMixture& request, uint64_t memory, int first_failing = -2) {
+  device::Device device(std::make_shared<SmallBackend>(memory, first_failing));
+  int bands = 0;
+  const Trial trial{"", 0, [&](const std::string& stage, double) { bands += stage == "mixture"; }};
+  MixedDenoising mixed = mix_mean(device, request, trial);
+  return {std::move(mixed), bands};
+}
+
+TEST(GpuMixedDenoising, PlansTheMemoryThatThereIs) {
+  const HighPicture p;
+  const auto pixels = static_cast<uint64_t>(HighPicture::kHigh) * HighPicture::kNarrow;
+  const uint64_t plan = static_cast<uint64_t>(bytes_of_mean(6)) * pixels * 5 / 4;
+  const auto [whole, one] = mixed_by(p.request(), plan + 10000);
+  EXPECT_EQ(one, 1);
+  const auto [in_bands, bands] = mixed_by(p.request(), plan - plan / 50);
+  EXPECT_GT(bands, 1);
+  expect_like_whole(whole, in_bands);
+  EXPECT_THROW(mixed_by(p.request(), plan / 4), device::Failure);
+}
+
+/// With the network's images of the first try.
+TEST(GpuMixedDenoising, FallsBackToBandsWithoutMemory) {
+  const HighPicture p;
+  const auto [whole, one] = mixed_by(p.request(true), uint64_t{1} << 30);
+  const auto [in_bands, bands] = mixed_by(p.request(true), uint64_t{1} << 30, 36);
+  EXPECT_EQ(one, 1);
+  EXPECT_GT(bands, 1);
+  expect_like_whole(whole, in_bands);
 }
 
 TEST(GpuMixedDenoising, IsTheSameEveryTime) {

@@ -17,28 +17,6 @@ device::Kernel kernel(Device& device, const char* name, int candidates, bool pla
   return device.kernel("mixture.cl", name, with_bug({fmt::format("M={}", candidates)}, planted_bug));
 }
 
-/// The normal equations of the rows that determine the weights of the whole image.
-std::vector<NormalRow> sampled_normal_rows(Device& device, const MixtureBuffers& in) {
-  const int n_sums = n_normal_sums(in.candidates), n_parts = (in.width + kPartOfRow - 1) / kPartOfRow;
-  std::vector<NormalRow> rows;
-  for (const auto& [first, end] : sampled_rows(in.width, in.height)) {
-    const int n = end - first;
-    const auto parts = device.make<float>(static_cast<size_t>(n) * n_parts * n_sums);
-    device.launch(kernel(device, "normal_parts", in.candidates, in.planted_bug), image_of(n_parts, n), kOfImage,
-                  *in.halves[0].base, *in.halves[1].base, *in.halves[0].candidates, *in.halves[1].candidates,
-                  *in.independent[0], *in.independent[1], *in.counts[0], *in.counts[1], *in.valid, in.bias_share,
-                  in.width, in.height, first, n, kPartOfRow, parts);
-    const std::vector<float> sums = device.download(parts);
-    for (int y = 0; y < n; ++y) {
-      NormalRow& row = rows.emplace_back();
-      for (int part = 0; part < n_parts; ++part)
-        for (int k = 0; k < n_sums; ++k)
-          row[static_cast<size_t>(k)] += sums[(static_cast<size_t>(y) * n_parts + part) * n_sums + k];
-    }
-  }
-  return rows;
-}
-
 Buffer<float> mixed(Device& device, const MixtureBuffers& in, const CandidateBuffers& set,
                     const Buffer<float>& weights) {
   auto result = device.make<float>(set.base->size());
@@ -58,8 +36,24 @@ Buffer<float> error_weights(Device& device, const Buffer<float>& guide, const Bu
   return result;
 }
 
-MixedBuffers mix(Device& device, const MixtureBuffers& in,
-                 const std::function<std::vector<float>(const std::vector<NormalRow>&)>& everywhere) {
+std::vector<NormalRow> normal_rows(Device& device, const MixtureBuffers& in, int first, int end) {
+  const int n_sums = n_normal_sums(in.candidates), n_parts = (in.width + kPartOfRow - 1) / kPartOfRow;
+  const int n = end - first;
+  const auto parts = device.make<float>(static_cast<size_t>(n) * n_parts * n_sums);
+  device.launch(kernel(device, "normal_parts", in.candidates, in.planted_bug), image_of(n_parts, n), kOfImage,
+                *in.halves[0].base, *in.halves[1].base, *in.halves[0].candidates, *in.halves[1].candidates,
+                *in.independent[0], *in.independent[1], *in.counts[0], *in.counts[1], *in.valid, in.bias_share,
+                in.width, in.height, first, n, kPartOfRow, parts);
+  const std::vector<float> sums = device.download(parts);
+  std::vector<NormalRow> rows(static_cast<size_t>(n));
+  const float* next = sums.data();
+  for (NormalRow& row : rows)
+    for (int part = 0; part < n_parts; ++part, next += n_sums)
+      for (int k = 0; k < n_sums; ++k) row[static_cast<size_t>(k)] += next[k];
+  return rows;
+}
+
+MixedBuffers mix(Device& device, const MixtureBuffers& in, const std::vector<float>& everywhere) {
   COVARY_CHECK(in.candidates >= 1 && in.candidates <= kMaxCandidates, "between one and kMaxCandidates candidates");
   const int columns = cells_in(in.width), rows = cells_in(in.height), m = in.candidates;
   const Buffer<float>& guide = *in.whole.candidates;
@@ -68,11 +62,8 @@ MixedBuffers mix(Device& device, const MixtureBuffers& in,
                 *in.halves[0].base, *in.halves[1].base, *in.halves[0].candidates, *in.halves[1].candidates,
                 *in.independent[0], *in.independent[1], *in.counts[0], *in.counts[1], *in.valid, in.bias_share,
                 in.width, in.height, cells);
-  std::vector<float> prior(static_cast<size_t>(m));
-  if (in.prior > 0) {
-    prior = everywhere(sampled_normal_rows(device, in));
-    prior.resize(static_cast<size_t>(m));
-  }
+  std::vector<float> prior = everywhere;
+  prior.resize(static_cast<size_t>(m));
   const Buffer<float> of_whole = device.upload(std::span(std::as_const(prior)));
   MixedBuffers result;
   result.weights = device.make<float>(static_cast<size_t>(m) * in.width * in.height);

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <functional>
 #include <vector>
 
 #include "denoising/mixture.h"
@@ -41,10 +40,12 @@ struct MixedBuffers {
   Buffer<float> image, weights;
   std::array<Buffer<float>, 2> halves;
 };
-/// `everywhere`: the weights of the whole image, from the normal equations of its rows. The first candidate of all
-/// samples is the guide.
-MixedBuffers mix(Device& device, const MixtureBuffers& in,
-                 const std::function<std::vector<float>(const std::vector<NormalRow>&)>& everywhere);
+/// `everywhere`: the weights of the whole image, which normal_rows() determine. The first candidate of all samples is
+/// the guide.
+MixedBuffers mix(Device& device, const MixtureBuffers& in, const std::vector<float>& everywhere);
+
+/// The normal equations of rows first … end - 1, of the halves alone.
+std::vector<NormalRow> normal_rows(Device& device, const MixtureBuffers& in, int first, int end);
 
 /// How much the candidates differ from the mixture (denoising/mixture.h).
 Buffer<float> disagreement(Device& device, const MixtureBuffers& in, const Buffer<float>& mixture);

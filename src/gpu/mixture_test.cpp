@@ -90,9 +90,9 @@ struct Example {
     return in;
   }
   MixedBuffers mix_on_device(bool planted_bug = false) const {
-    return gpu::mix(test_device(), input(planted_bug), [&](const std::vector<NormalRow>& rows) {
-      return weights_of_whole(true, makers, weighting, mean_samples(groups.view()), rows);
-    });
+    const MixtureBuffers in = input(planted_bug);
+    const std::vector<NormalRow> rows = gpu::normal_rows(test_device(), in, 0, kHeight);
+    return gpu::mix(test_device(), in, weights_of_whole(true, makers, weighting, mean_samples(groups.view()), rows));
   }
 };
 

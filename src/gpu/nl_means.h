@@ -26,9 +26,10 @@ struct NlMeansInput {
   const device::Buffer<float>* image = nullptr;
   const device::Buffer<float>* std_error = nullptr;
   const device::Buffer<unsigned char>* valid = nullptr;
-  std::vector<FeatureImage> features;  ///< at most two
-  std::vector<float> bandwidths;       ///< one or two
-  bool planted_bug = false;            ///< for tests
+  std::vector<FeatureImage> features;             ///< at most two
+  std::vector<float> bandwidths;                  ///< one or two
+  bool planted_bug = false;                       ///< for tests
+  const device::Buffer<float>* source = nullptr;  ///< what is averaged; null: the image itself
 };
 
 /// Writes the filtered image of each bandwidth to its place.

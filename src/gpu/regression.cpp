@@ -39,7 +39,8 @@ void regressed(device::Device& device, const RegressionBuffers& in, const device
                 fmt::format("FIRST_OF_POSITION={}", in.features->has_position ? terms - 3 : terms)},
                in.planted_bug);
   const int columns = (in.width + step - 1) / step, rows = (in.height + step - 1) / step;
-  const int most = static_cast<int>(in.weights_at_once / (static_cast<size_t>(columns) * kWindow));
+  const size_t weights_at_once = std::min<size_t>(in.weights_at_once, device.info().memory / (16 * sizeof(float)));
+  const int most = static_cast<int>(weights_at_once / (static_cast<size_t>(columns) * kWindow));
   const int rows_at_once = std::clamp(most, 1, rows);
   const size_t windows = static_cast<size_t>(columns) * rows_at_once,
                pixels = static_cast<size_t>(in.width) * in.height;

@@ -27,7 +27,8 @@ struct RegressionBuffers {
   Place other;          ///< another filter's image
   bool coarse = false;  ///< RegressionInput::coarse
   bool planted_bug = false;
-  size_t weights_at_once = size_t{1} << 25;  ///< of windows, kept between two kernels: 128 MiB
+  /// Of windows, kept between two kernels: at most 128 MiB, and a sixteenth of the device's memory.
+  size_t weights_at_once = size_t{1} << 25;
 };
 
 /// The filtered image, at the beginning of `result`. The number of weights that are kept at once may change bits, as

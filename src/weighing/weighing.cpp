@@ -16,8 +16,6 @@ namespace {
 constexpr int kSmall = 24, kMiddle = 28, kLarge = 40;  // outputs of the layers by size of cells
 constexpr int kMultiple = kWeighingRows / kWeighedCell;
 
-enum Layer { kMix, kA, kB, kB2, kC, kC2, kD, kE, kOut };
-
 /// Powers of four of y / 2 + sqrt(y^2 / 4 + 1) over their sum, in place.
 void share_out(Planes& planes) {
   parallel_for(planes.height(), 8, [&](int y) {
@@ -58,8 +56,9 @@ const WeighingNetwork* WeighingNetwork::find(std::span<const std::string> names)
 }
 
 Planes WeighingNetwork::shares(const WeighingInput& input) const {
-  const auto layer = [&](Layer i, const Planes& first, const Planes* second = nullptr) {
-    return convolved(layers_[i], {&first, second}, i != kOut);
+  using enum WeighingLayer;
+  const auto layer = [&](WeighingLayer i, const Planes& first, const Planes* second = nullptr) {
+    return convolved(layers_[static_cast<size_t>(i)], {&first, second}, i != kOut);
   };
   const Planes a = layer(kA, layer(kMix, weighing_features(input, kMultiple)));
   const Planes b = layer(kB2, layer(kB, halved(a)));

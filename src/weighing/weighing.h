@@ -19,6 +19,9 @@
 
 namespace covary {
 
+/// The layers of the network, in order: over cells (A, E), and over 2 x 2 and 4 x 4 of them (B and D, C).
+enum class WeighingLayer { kMix, kA, kB, kB2, kC, kC2, kD, kE, kOut };
+
 class WeighingNetwork {
  public:
   /// `bytes`: the layers' weights in order, 16-bit floats. `candidates`: their number.
@@ -28,6 +31,9 @@ class WeighingNetwork {
 
   /// The shares of the mean and the candidates, one plane each, by cells. Bit-identical for any number of threads.
   Planes shares(const WeighingInput& input) const;
+
+  int candidates() const { return layers_.back().outputs - 1; }
+  const std::vector<Convolution>& layers() const { return layers_; }
 
  private:
   std::vector<Convolution> layers_;

@@ -8,9 +8,11 @@
 // column. For each offset o = j - i, items put the terms of their pixels into local memory, where patches are summed:
 // first rows of three, then three of these. Two buffers take turns, so that one barrier per offset is enough.
 //
-// Options: GUIDES, images q (0 to 2); TASKS, bandwidths k of the same source (1 or 2).
-// Compiled: GUIDES=1 TASKS=1
-// Compiled: GUIDES=2 TASKS=2
+// Options: GUIDES, images q (0 to 2); TASKS, bandwidths k of the same source (1 or 2); SOURCE, 1: another image than f
+// is averaged.
+// Compiled: GUIDES=1 TASKS=1 SOURCE=0
+// Compiled: GUIDES=2 TASKS=2 SOURCE=0
+// Compiled: GUIDES=2 TASKS=1 SOURCE=1
 #include "portable.h"
 #include "pixels.h"
 
@@ -39,9 +41,10 @@ FUNCTION float guide_distance(GLOBAL const float* guide, float scale, int i, int
 }
 #endif
 
-KERNEL nl_means(GLOBAL const float* image, GLOBAL const float* std_error, GLOBAL const uchar* valid,
-                     GLOBAL const float* guide0, float unit0, GLOBAL const float* guide1, float unit1, int width,
-                     int height, float bandwidth0, float bandwidth1, GLOBAL float* results, int first0, int first1) {
+KERNEL nl_means(GLOBAL const float* image, GLOBAL const float* source, GLOBAL const float* std_error,
+                GLOBAL const uchar* valid, GLOBAL const float* guide0, float unit0, GLOBAL const float* guide1,
+                float unit1, int width, int height, float bandwidth0, float bandwidth1, GLOBAL float* results,
+                int first0, int first1) {
   LOCAL_ARRAY(float, terms, 2 * TILE * TILE);
   const int column = get_local_id(0), strip = STRIP * get_local_id(1);
   const int x = get_group_id(0) * INNER - 1 + column, y = get_group_id(1) * INNER - 1 + strip;
@@ -57,13 +60,14 @@ KERNEL nl_means(GLOBAL const float* image, GLOBAL const float* std_error, GLOBAL
   int turn = 0;
   for (int dy = -RADIUS; dy <= RADIUS; ++dy)
     for (int dx = -RADIUS; dx <= RADIUS; ++dx, turn ^= 1) {
-      float there[STRIP][3];
+      float averaged[STRIP][3];
       for (int r = 0; r < STRIP; ++r) {
         const int j = 3 * (clamped(y + r + dy, height) * width + clamped(x + dx, width));
         float sum = 0;
         for (int c = 0; c < 3; ++c) {
-          there[r][c] = image[j + c];
-          sum += term_of(own[r][c] - there[r][c], variance[r][c], variance_of(std_error[j + c]));
+          const float there = image[j + c];
+          averaged[r][c] = SOURCE ? source[j + c] : there;
+          sum += term_of(own[r][c] - there, variance[r][c], variance_of(std_error[j + c]));
         }
         terms[(turn * TILE + strip + r) * TILE + column] = sum;
       }
@@ -94,7 +98,7 @@ KERNEL nl_means(GLOBAL const float* image, GLOBAL const float* std_error, GLOBAL
 #endif
         for (int k = 0; k < TASKS; ++k) {
           const float weight = exp_of_nonpositive(-max(max(patch * scales[k], distance), 0.0f));
-          for (int c = 0; c < 3; ++c) sums[r][k][c] = fma(weight, there[r][c], sums[r][k][c]);
+          for (int c = 0; c < 3; ++c) sums[r][k][c] = fma(weight, averaged[r][c], sums[r][k][c]);
           sums[r][k][3] += weight;
         }
       }
@@ -106,6 +110,6 @@ KERNEL nl_means(GLOBAL const float* image, GLOBAL const float* std_error, GLOBAL
     for (int k = 0; k < TASKS; ++k)
       for (int c = 0; c < 3; ++c)
         results[(k == 0 ? first0 : first1) + i + c] =
-            sums[r][k][3] > 0 ? sums[r][k][c] / sums[r][k][3] : own[r][c];
+            sums[r][k][3] > 0 ? sums[r][k][c] / sums[r][k][3] : SOURCE ? source[i + c] : own[r][c];
   }
 }

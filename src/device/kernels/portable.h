@@ -38,9 +38,7 @@ typedef unsigned int uint;
 typedef unsigned short ushort;
 typedef unsigned char uchar;
 extern "C" __constant__ int first_group[3] = {0, 0, 0};  // set by cuda_backend.cpp
-FUNCTION int get_group_id(int d) {
-  return first_group[d] + (d == 0 ? blockIdx.x : d == 1 ? blockIdx.y : blockIdx.z);
-}
+FUNCTION int get_group_id(int d) { return first_group[d] + (d == 0 ? blockIdx.x : d == 1 ? blockIdx.y : blockIdx.z); }
 FUNCTION int get_local_id(int d) { return d == 0 ? threadIdx.x : d == 1 ? threadIdx.y : threadIdx.z; }
 FUNCTION int get_local_size(int d) { return d == 0 ? blockDim.x : d == 1 ? blockDim.y : blockDim.z; }
 FUNCTION int get_global_id(int d) { return get_group_id(d) * get_local_size(d) + get_local_id(d); }

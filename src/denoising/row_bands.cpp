@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "denoising/row_bands.h"
+
+#include <algorithm>
+
+#include "denoising/mixed_rows.h"
+#include "filters/regression.h"
+#include "filters/residual_correction.h"
+#include "weighing/weighing.h"
+
+namespace covary {
+
+static_assert(kBandCell % kResidualCell == 0 && kBandCell % kRegressionCell == 0 && kBandCell % kWeighingRows == 0);
+
+std::vector<RowBand> bands_of(int height, int rows_at_once, int reach, int first, int end) {
+  const int step = std::max(kBandCell, (rows_at_once - 2 * reach) / kBandCell * kBandCell - kBandCell);
+  std::vector<RowBand> bands;
+  for (int y = first; y < end; y += step) {
+    const int n = std::min(step, end - y), begin = std::max(0, y - reach) / kBandCell * kBandCell;
+    bands.push_back({begin, std::min(height, y + n + reach) - begin, y - begin, y, n});
+  }
+  return bands;
+}
+
+int candidates_reach(CandidateBase base, bool with_network, int reach_of_parts) {
+  const bool is_weighed = base == CandidateBase::kMean && !with_network;
+  return reach_of_parts + kCandidateReach + (is_weighed ? kWeighingReach : 0);
+}
+
+int mixed_reach(CandidateBase base, bool with_network, int reach_of_parts, const PartsWeighting& weighting) {
+  return candidates_reach(base, with_network, reach_of_parts) + mixture_reach(base == CandidateBase::kMean, weighting) +
+         kErrorReach;
+}
+
+FeatureRows::FeatureRows(const Features& whole, int first, int n) {
+  for (size_t i = 0; i < feature::kCount; ++i)
+    if (const Image* image = whole.*kImagesOfFeatures[i])
+      images[i] = rows_of(*image, first, n), features.*kImagesOfFeatures[i] = &images[i];
+  features.clean = whole.clean;
+}
+
+}  // namespace covary

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rows of an image and their mixture with denoised images on a device, step by step as denoising/parts_mixture.h and
+// denoising/mixed_rows.h.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "denoising/mean_mixture.h"
+#include "denoising/mixed_rows.h"
+#include "gpu/denoising_parts.h"
+#include "gpu/filtered_candidates.h"
+#include "gpu/mixture.h"
+#include "gpu/trial.h"
+
+namespace covary::gpu {
+
+/// Bytes of a device's memory for each pixel of the rows of a mean, and of the largest buffer.
+double bytes_of_mean(int groups);
+double largest_buffer_of_mean(int groups);
+
+class RowsOnDevice {
+ public:
+  /// `request`: with the samples and features of these rows, which must outlive the object.
+  RowsOnDevice(Device& device, const MeanMixture& request, const Trial& trial);
+  RowsOnDevice(Device& device, const PairMixture& request, const Trial& trial);
+
+  /// What a network denoises: of all samples and of both halves.
+  std::array<Image, 3> noisy();
+  /// Makes the candidates at first use. `network`: a network's images of these rows; null: without one.
+  void make_candidates(const NetworkImages* network);
+  const std::vector<CandidateMaker>& makers() const { return makers_; }
+  /// Of rows first … end - 1.
+  std::vector<NormalRow> normal_rows(int first, int end);
+  /// The mixture, and what its error needs of these rows. `everywhere`: weights of the whole image.
+  MixedRows mix(const std::vector<float>& everywhere);
+  /// Pixels that are left out, of rows first … first + n - 1.
+  long unusable(int first, int n);
+
+  /// Once there are any; of all samples.
+  std::vector<Image> candidates() { return downloaded_images(candidates_[0], 3); }
+  std::vector<Image> weights() { return downloaded_images(mixed_.weights, 1); }
+
+ private:
+  bool is_mean() const { return base_ == CandidateBase::kMean; }
+  size_t pixels() const { return static_cast<size_t>(groups_.pixels()); }
+  int n_made() const;
+  void add_network(const Image& clean, size_t part);
+  Buffer<float> counts_of(int half);
+  MixtureBuffers mixture_input();
+  void find_errors(MixedRows& rows);
+  Image downloaded(const Buffer<float>& buffer, int channels, size_t first = 0);
+  std::vector<Image> downloaded_images(const Buffer<float>& buffer, int channels);
+
+  Device& device_;
+  const CandidateBase base_;
+  const GroupedImage independent_;
+  const Features auxiliary_;
+  const FilterKinds kinds_;
+  const PartsWeighting weighting_;
+  const bool std_error_;
+  Stages stages_;
+  Groups groups_;
+  std::optional<FeatureBuffers> features_;
+  std::array<PartBuffers, 3> parts_;
+  std::vector<CandidateMaker> makers_;
+  int n_candidates_ = 0;
+  std::array<Buffer<float>, 3> candidates_;
+  std::array<Buffer<float>, 2> counts_;
+  MixedBuffers mixed_;
+};
+
+}  // namespace covary::gpu
