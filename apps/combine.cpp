@@ -51,7 +51,7 @@ struct CombineOptions : CombineSettings {
   OptionValues values, of_estimator;
   FrameOptions of_frames;
   std::string stages, json, view;
-  bool quiet = false, overwrite = false;
+  bool quiet = false, verbose = false, overwrite = false;
   int threads = 0;
   MethodTarget target;  ///< of `device`
 };
@@ -287,6 +287,7 @@ void combine_files(const CombineOptions& o) {
   };
   CombinedImage combined = combine(request);
   if (inputs.layers) inputs.layers->finish(combined.layers);
+  const std::string lines = error_lines(combined, o.verbose);
   Stopwatch watch;
   progress.begin("writing");
   const std::vector<std::string> lost = write(o, request, inputs.independent.source(), combined);
@@ -305,7 +306,10 @@ void combine_files(const CombineOptions& o) {
                o.output, request.independent.width, request.independent.height, request.estimator.text,
                request.crn ? fmt::format("{} + ", request.crn->groups) : "", request.independent.groups,
                combined.estimate_seconds, combined.check_seconds, write_seconds);
-  if (!o.quiet) print_risks(combined, o.denoising);
+  if (!o.quiet) {
+    print_notes(o.denoising, combined.image.note);
+    fmt::print(stderr, "{}", lines);
+  }
   if (!o.json.empty()) write_text_output(o.json, json_text(json));
 }
 
@@ -366,6 +370,7 @@ void add_combine(CLI::App& app) {
   add_threads_option(*command, o->threads);
   add_overwrite_option(*command, o->overwrite);
   add_value(*command, "--json", o->json, kFileValue, "File for statistics; '-': standard output");
+  command->add_flag("--verbose", o->verbose, kVerboseHelp);
   command->add_flag("--quiet", o->quiet, "Warnings and errors only");
   add_frame_options(*command, o->of_frames, "With --denoise, combine");
   command->callback([o] { run(*o); });

@@ -59,7 +59,8 @@ struct Options {
   std::string output, mode, oidn, albedo, normal, json;
   PictureChoice choice;
   std::vector<std::string> layers;
-  bool no_features = false, clean_features = false, check = false, quiet = false, force = false, overwrite = false;
+  bool no_features = false, clean_features = false, check = false, force = false, overwrite = false;
+  bool quiet = false, verbose = false;
   FrameOptions of_frames;
   std::optional<double> memory_mib;
   std::shared_ptr<const History> history;  ///< of the frame being denoised
@@ -222,10 +223,10 @@ Denoised denoise_by_mixture(const Options& o, const Task& task, const GroupedFil
     print_findings(found.findings, "denoises", o.force, o.quiet);
     progress.begin("denoising");
   };
-  auto combined = std::make_shared<CombinedImage>(combine(request));
-  layers.finish(combined->layers);
+  CombinedImage combined = combine(request);
+  layers.finish(combined.layers);
   Denoised result;
-  result.json = statistics(o, request, *combined, choice);
+  result.json = statistics(o, request, combined, choice);
   if (!task.is_only) result.json["picture"] = task.picture.layer;
   result.result.source = file.source();
   if (!task.picture.channels[0].empty()) result.result.source.picture = task.picture.channels;
@@ -235,17 +236,15 @@ Denoised denoise_by_mixture(const Options& o, const Task& task, const GroupedFil
   result.attributes["covary:estimator"] = request.estimator.text;
   if (!request.estimator.network.empty()) result.attributes["covary:denoiser"] = request.estimator.network;
   if (file.samples() > 0) result.attributes["covary:samples"] = fmt::to_string(file.samples());
-  result.predicted = combined->predicted;
-  result.result.image = std::move(combined->image);
-  combined->image = {};
-  combined->image.risks = result.result.image.risks, combined->image.note = result.result.image.note;
-  result.result.aovs = std::move(combined->layers);
+  result.predicted = combined.predicted;
+  const std::string note = combined.image.note, lines = error_lines(combined, o.verbose);
+  result.result.image = std::move(combined.image), result.result.aovs = std::move(combined.layers);
   const std::string what = fmt::format("{}{}: {} x {}, {} of {}, {}, in {:.2f} s", o.output, task.text(), file.width(),
                                        file.height(), request.estimator.text, file.groups_text(), features.text(),
-                                       combined->check_seconds + combined->estimate_seconds);
-  result.report = [what, combined, choice] {
-    fmt::print(stderr, "{}\n", what);
-    print_risks(*combined, choice);
+                                       combined.check_seconds + combined.estimate_seconds);
+  result.report = [what, note, lines, choice] {
+    print_notes(choice, note);
+    fmt::print(stderr, "{}\n{}", what, lines);
   };
   return result;
 }
@@ -393,6 +392,7 @@ void add_denoise(CLI::App& app) {
   add_frame_options(*command, o->of_frames, "Denoise");
   add_overwrite_option(*command, o->overwrite);
   command->add_flag("--force", o->force, "Denoise even if the renders do not match");
+  command->add_flag("--verbose", o->verbose, kVerboseHelp);
   command->add_flag("--quiet", o->quiet, "No summary");
   command->callback([o] { run(*o); });
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "core/shell_text.h"
 #include "film/splat_layer.h"
@@ -24,8 +25,6 @@ namespace {
 /// The error of a result falls like samples^-p: of means, of control variates, and of denoised images (measured on ten
 /// scenes from 16 to 64 samples: docs/notes/denoising.md, docs/methods/iicv.md).
 constexpr double kFallOfMeans = 1, kFallOfPairs = 0.75, kFallOfDenoised = 0.5;
-/// The predicted error is mostly that of few pixels if it is more than so many times that of nearly all blocks.
-constexpr double kManyTimes = 4;
 /// Most of the time, and a render for which it matters.
 constexpr double kMaxTime = 0.5, kLongSeconds = 5;
 
@@ -33,9 +32,6 @@ double fall_of(const RenderOptions& options) {
   if (options.settings.denoising.denoises()) return kFallOfDenoised;
   return estimator_of(options).pair() ? kFallOfPairs : kFallOfMeans;
 }
-
-/// "4", "0.35": two digits.
-std::string percent_text(double relmse) { return fmt::format("{:.2g} %", 100 * std::sqrt(std::max(0.0, relmse))); }
 
 /// ": `--spp 64` halves it", ": about 2.8 % with `--spp 64`"; empty if so many samples are too many.
 std::string more_samples(const RenderReport& report, double relmse) {
@@ -57,20 +53,15 @@ std::string samples_text(const RenderResult& result) {
   return text;
 }
 
-/// How much of the picture is noise or blur, as a fraction of its brightness: the root of relMSE.
 std::string quality_text(const RenderReport& report) {
   const RenderResult& result = report.result;
   if (!result.predicted) return "unknown, as no error is predicted here";
-  const bool blurred = result.image.risks && result.image.risks->bias_share > 0.5;
-  // A few pixels that may be fireflies would say nothing about the rest.
-  const bool by_few = result.predicted->relmse > kManyTimes * result.predicted_blocks && result.predicted_blocks > 0;
-  const double relmse = by_few ? result.predicted_blocks : result.predicted->relmse;
-  std::string text =
-      fmt::format("{} {} {} left{}", by_few ? "at most" : "about", percent_text(relmse), blurred ? "error" : "grain",
-                  by_few ? " in 95 % of the picture, more in few bright pixels" : "");
-  if (!result.predicted->doubt.empty()) text += " (unsure: `--verbose` says why)";
-  if (result.until_reached.value_or(false)) text += ", as asked by --until";
-  return text + more_samples(report, relmse);
+  const std::vector<float>& values = result.image.estimate.data;
+  if (!values.empty() && std::ranges::all_of(values, [](float value) { return value == 0; }))
+    return "the picture is black: the camera sees nothing that is lit";
+  const Quality quality(*result.predicted, result.image.risks, result.predicted_blocks);
+  const char* asked = result.until_reached.value_or(false) ? ", as asked by --until" : "";
+  return quality.text + asked + more_samples(report, quality.relmse);
 }
 
 /// What to do for a better picture; empty if there is nothing in particular.
@@ -116,8 +107,9 @@ void print_warnings(const RenderReport& report) {
   print_notes(report.options.settings.denoising, result.image.note);
   const double limit = report.options.request().seconds;
   if (limit > 0 && result.seconds.limited > 1.1 * limit)
-    fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for {:g} samples per pixel\n", limit,
-               result.seconds.limited, result.samples_per_pixel());
+    fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for {:g} {} per pixel\n", limit,
+               result.seconds.limited, result.samples_per_pixel(),
+               result.samples_per_pixel() == 1 ? "sample" : "samples");
 }
 
 }  // namespace

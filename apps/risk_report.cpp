@@ -3,11 +3,17 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "method_options.h"
 #include "risk/error_interval.h"
 
 namespace covary {
 namespace {
+
+/// The predicted error is mostly that of few pixels if it is more than so many times that of nearly all blocks.
+constexpr double kManyTimes = 4;
 
 /// ", 18 % of it squared bias; the mean of the samples has 0.012, Open Image Denoise alone 0.0025"
 std::string risks_text(const MeasuredRisks& risks) {
@@ -39,6 +45,18 @@ std::string prediction_text(const PredictedError& predicted, const std::optional
   return text;
 }
 
+std::string percent_text(double relmse) { return fmt::format("{:.2g} %", 100 * std::sqrt(std::max(0.0, relmse))); }
+
+Quality::Quality(const PredictedError& predicted, const std::optional<MeasuredRisks>& risks, double of_blocks) {
+  const bool blurred = risks && risks->bias_share > 0.5;
+  // A few pixels that may be fireflies would say nothing about the rest.
+  const bool by_few = predicted.relmse > kManyTimes * of_blocks && of_blocks > 0;
+  relmse = by_few ? of_blocks : predicted.relmse;
+  text = fmt::format("{} {} {} left{}", by_few ? "at most" : "about", percent_text(relmse), blurred ? "error" : "grain",
+                     by_few ? " in 95 % of the picture, more in few bright pixels" : "");
+  if (!predicted.doubt.empty()) text += " (unsure: `--verbose` says why)";
+}
+
 void add_prediction(const PredictedError& predicted, nlohmann::ordered_json& json) {
   const auto& [relmse, bounds, doubt] = predicted;
   json["predicted_relmse"] = relmse;
@@ -61,9 +79,13 @@ void print_notes(const DenoisingChoice& choice, const std::string& note) {
     if (!text.empty()) fmt::print(stderr, "note: {}\n", as_options(text));
 }
 
-void print_risks(const CombinedImage& combined, const DenoisingChoice& choice) {
-  print_notes(choice, combined.image.note);
-  if (combined.predicted) fmt::print(stderr, "{}\n", prediction_text(*combined.predicted, combined.image.risks));
+std::string error_lines(const CombinedImage& combined, bool verbose) {
+  if (!combined.predicted) return "";
+  const auto& risks = combined.image.risks;
+  const double of_blocks = combined.image.std_error.data.empty() ? 0 : predicted_blocks(combined.image);
+  std::string lines = "how good: " + Quality(*combined.predicted, risks, of_blocks).text + "\n";
+  if (verbose) lines += prediction_text(*combined.predicted, risks) + "\n";
+  return lines;
 }
 
 void add_risks(const std::optional<MeasuredRisks>& risks, nlohmann::ordered_json& json) {

@@ -20,13 +20,25 @@ namespace covary {
 /// 0.012, Open Image Denoise alone 0.0025 (unreliable: known to a factor of 1.8)", as far as known.
 std::string prediction_text(const PredictedError& predicted, const std::optional<MeasuredRisks>& risks);
 
+/// "4.2 %": how much of a picture is noise or blur, as a fraction of its brightness, the root of relMSE.
+std::string percent_text(double relmse);
+
+/// The predicted error in plain words: "about 4.2 % grain left (unsure: `--verbose` says why)".
+struct Quality {
+  std::string text;
+  double relmse = 0;  ///< the error that it names
+  /// `of_blocks`: predicted_blocks(), or 0.
+  Quality(const PredictedError& predicted, const std::optional<MeasuredRisks>& risks, double of_blocks);
+};
+
 /// Lines on stderr: problems of the inputs and, unless `quiet`, notes. Throws Error(kInput) instead if there are
 /// errors, unless `force` turns them into warnings. `work`: what the command does then, e.g. "combines".
 void print_findings(const std::vector<Finding>& findings, const char* work, bool force, bool quiet);
 /// Lines on stderr: the missing network, and `note`, if any.
 void print_notes(const DenoisingChoice& choice, const std::string& note);
-/// These notes of an image, followed by its risks.
-void print_risks(const CombinedImage& combined, const DenoisingChoice& choice);
+/// How good an image is and, with `verbose`, its predicted error, each with a line feed; empty if it is unknown.
+std::string error_lines(const CombinedImage& combined, bool verbose);
+constexpr const char* kVerboseHelp = "In the summary, also the predicted error with its interval";
 
 /// "predicted_relmse", its bounds "predicted_relmse_low" and "_high", "predicted_relmse_reliable" and the doubt.
 void add_prediction(const PredictedError& predicted, nlohmann::ordered_json& json);

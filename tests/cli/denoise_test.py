@@ -232,8 +232,12 @@ class Denoise(RenderTest):
         for seed in "12":
             self.good("render", MATERIALS, *SMALL[:2], "-o", f"{seed}.exr", "--spp", "48", "--estimator", "none",
                       "--denoise", "none", "--rfilter", "box", "--seed", seed, "--quiet")
-        last = self.good("denoise", "1.exr", "2.exr", "-o", "two.exr", *PLAIN).stderr.splitlines()[-1]
-        self.assertRegex(last, r"^predicted relMSE 0\.\d+, between 0\.\d+ and 0\.\d+ \(80 %\)")
+        denoise = ("denoise", "1.exr", "2.exr", "-o", "two.exr", *PLAIN, "--overwrite")
+        plain, detailed = (self.good(*denoise, *words).stderr.splitlines() for words in ((), ("--verbose",)))
+        good = r"^how good: about [\d.]+ % (grain|error) left( \(unsure: `--verbose` says why\))?$"
+        self.assertRegex(plain[-1], good)
+        self.assertEqual(detailed[-2], plain[-1])
+        self.assertRegex(detailed[-1], r"^predicted relMSE 0\.\d+, between 0\.\d+ and 0\.\d+ \(80 %\)")
         # What a film says of its image is no part of the film.
         film = ("render", MATERIALS, *SMALL[:2], "--estimator", "none", "--groups", "12", "--quiet", "--spp", "24")
         self.good(*film, "-o", "f.exr", "--json", "f.json")
@@ -455,7 +459,7 @@ class Denoise(RenderTest):
             for name, values, value in zip("ab", renders, bad, strict=True):
                 values = values if value is None else [*values[:at], value, *values[at + 1:]]
                 self.write(f"{name}.exr", exr({c: values for c in "RGB"}, (width, height)))
-            said = self.good("denoise", "a.exr", "b.exr", "-o", "out.exr", *PLAIN).stderr
+            said = self.good("denoise", "a.exr", "b.exr", "-o", "out.exr", *PLAIN, "--verbose").stderr
             image = read_exr((self.path / "out.exr").read_bytes())
             self.assertLess(image["R"][at], 100)
             return said, sum((image["R"][i] - truth[i]) ** 2 for i in far) / len(far)
