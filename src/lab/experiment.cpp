@@ -315,6 +315,13 @@ class Experiment {
     for (const Cell& cell : results_.cells) {
       const std::string where = fmt::format("{}, {}, {}: ", suite.scenes[cell.scene].name,
                                             suite.methods[cell.method].name, suite.budgets[cell.budget].label());
+      if (cell.split.n_non_finite > 0)
+        results_.warnings.push_back(fmt::format(
+            "{}{} pixels ({:.2g} % of all) are not finite in a run or reference and left out of its errors, "
+            "which may therefore be too small",
+            where, cell.split.n_non_finite,
+            100.0 * static_cast<double>(cell.split.n_non_finite) /
+                static_cast<double>(cell.split.n_non_finite + cell.split.n_pixels)));
       for (const std::string& text : cell.suspicions) results_.warnings.push_back(where + text);
       if (std::abs(cell.time_ratio - 1) > 0.1)
         results_.warnings.push_back(fmt::format("{}took {:.3g} s, {:+.0f} % off the budget", where,

@@ -209,8 +209,10 @@ std::vector<const Summary*> comparable(const Results& results, size_t budget) {
   return all;
 }
 
-/// Two digits, without an exponent: 0.73, 19, 6300.
+/// Two digits, without an exponent: 0.000073, 0.73, 19, 6300.
 std::string factor_text(double value) {
+  if (value > 0 && value < 1e-4)
+    return fmt::format("{:.{}f}", value, 1 - static_cast<int>(std::floor(std::log10(value))));
   if (!(value >= 100) || !std::isfinite(value)) return fmt::format("{:.2g}", value);
   const double unit = std::pow(10, std::floor(std::log10(value)) - 1);
   return fmt::format("{:.0f}", std::round(value / unit) * unit);

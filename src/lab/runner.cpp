@@ -13,6 +13,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <sstream>
 #include <utility>
 
@@ -54,9 +55,11 @@ void add_statistics(const nlohmann::json& stats, size_t n, RunRecord& record) {
 }
 
 /// The times of a program that says how long its work took elsewhere or earlier, in lines "seconds 1.5" and
-/// "processor_seconds 1.2".
+/// "processor_seconds 1.2": NaN, unknown, if it tells the first alone.
 ProcessResult told_times(ProcessResult process) {
   std::istringstream lines(process.output);
+  if (process.output.starts_with("seconds ") || process.output.find("\nseconds ") != std::string::npos)
+    process.processor_seconds = std::numeric_limits<double>::quiet_NaN();
   for (std::string line; std::getline(lines, line);)
     for (const auto& [name, value] :
          {std::pair{"seconds ", &process.seconds}, {"processor_seconds ", &process.processor_seconds}})
@@ -213,6 +216,7 @@ Runner::Result Runner::execute(const Run& run, const SceneInstance& scene) const
     add_step(typed_step, after);
     output = next;
   }
+  if (std::isnan(record.processor_seconds)) record.processor_seconds = 0;  // unknown
   cache_.write_json("runs", run.key + "/run.json", json_of(record));
   return {record, std::nullopt};
 }

@@ -188,7 +188,8 @@ std::string folder_with(const std::string& root, const std::string& file, const 
 std::string scenes_folder(const Suite& suite, const std::string& word, const std::string& program) {
   const fs::path given(word);
   if (given.extension() == ".json") return (fs::absolute(given).parent_path() / suite.scene_root).string();
-  if (given.extension() == ".xml" || suite.scenes.empty()) return fs::current_path().string();
+  if (given.extension() == ".xml" || suite.scenes.empty() || fs::path(suite.scenes[0].file).is_absolute())
+    return fs::current_path().string();
   if (!suite.scene_root.empty())
     if (std::string folder = folder_with(suite.scene_root, suite.scenes[0].file, program); !folder.empty())
       return folder;

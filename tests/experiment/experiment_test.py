@@ -464,6 +464,14 @@ class Programs(ExperimentTest):
         self.assertLess(copy["equal_time"]["value"], 0.1)
         self.assertGreater(copy["equal_processor_time"]["value"], 0.1)
 
+    def test_a_program_that_tells_its_seconds_alone(self):
+        """Its processor time is then unknown, and not that of the command."""
+        results = self.results("--program", 'mine=cp "$COVARY_IMAGE" "$COVARY_OUTPUT"; echo seconds 1000')
+        copy = next(cell for cell in results["cells"] if cell["method"] == "copy")
+        self.assertLess(copy["equal_time"]["value"], 0.1)
+        self.assertEqual((copy["seconds"]["processor"]["value"], copy["equal_processor_time"]["value"]), (0, None))
+        self.assertFalse([text for text in results["warnings"] if "processor time" in text])
+
     def test_mistakes(self):
         self.bad(2, "method 'copy' is made by a program of your own: give --program mine=COMMAND")
         self.bad(2, "--program 'mine': expected NAME=COMMAND", "--program", "mine")

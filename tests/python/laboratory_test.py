@@ -150,6 +150,17 @@ class Experiments(PackageTest):
         self.assertEqual((axes.lines, axes.words["yscale"]), ([((16.0,), "room, pt")], "log"))
         self.assertEqual(axes.ticks, ([16.0], ["16"]))
 
+    def test_pixels_that_are_not_finite_are_told(self):
+        """Left out of errors, they would make a method better than it is."""
+        def broken(samples):
+            image = samples.image.copy()
+            image[:6] = numpy.nan
+            return image
+
+        warnings = self.experiment(broken=broken).results["warnings"]
+        told = "room, broken, 16 spp: 192 pixels (25 % of all) are not finite"
+        self.assertTrue(any(told in text for text in warnings), warnings)
+
     def test_failures(self):
         def wrong(samples):
             raise ValueError("no idea")
