@@ -88,6 +88,22 @@ bool is_complete(const std::string& path, const std::string& made_of, double unt
                   path, earlier.empty() ? "no record of its settings" : differences(earlier, made_of)));
 }
 
+/// Removes what a full disk or a killed copy left of a frame.
+void remove_empty(const std::string& path) {
+  std::error_code ignored;
+  if (fs::is_regular_file(path, ignored) && fs::file_size(path, ignored) == 0 && !ignored) fs::remove(path, ignored);
+}
+
+/// What the checksums of a complete frame tell; empty if all is well.
+std::string damage_of(const std::string& path) {
+  try {
+    check_image(path);
+    return "";
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
 constexpr double kRateInSeconds = 24;  // of formats whose animations are in seconds
 
 /// The times of frames, and the camera's place at each.
@@ -113,13 +129,30 @@ class FrameTimes {
   /// Moves everything to its place in the frame.
   void place(int frame, const Transform& camera, LoadedScene& scene) const {
     scene.scene->move_to(time(frame));
-    place_camera(scene, camera);
+    try {
+      place_camera(scene, camera);
+    } catch (const Error& error) {
+      throw Error(ErrorCode::kInput, fmt::format("the camera of frame {}: {}", frame, error.what()));
+    }
   }
 
  private:
   std::optional<CameraPath> path_;
   double rate_ = 1;
 };
+
+bool is_framed(const LoadedScene& scene) { return std::ranges::count(scene.added, scene.sensor) > 0; }
+
+/// Where the camera stands if nothing moves it. If the file has none, it is framed as in frame 0, whichever frames are
+/// rendered, so that commands for different frames agree.
+Transform own_camera(const RenderOptions& one, const LoadedScene& scene) {
+  constexpr int kFramedIn = 0;
+  if (!scene.is_animated || !is_framed(scene) || one.sequence.frames->first == kFramedIn)
+    return scene.camera->settings().to_world;
+  RenderOptions framed = one;
+  framed.sequence.frames = FrameRange{kFramedIn, kFramedIn, 1};
+  return load(framed).camera->settings().to_world;
+}
 
 /// Traces the frame's motion layers; `before` is the previous camera transformation, at time `then`.
 void trace_motion(const Transform& before, double then, const LoadedScene& scene, RenderRequest& request) {
@@ -156,6 +189,7 @@ class SequenceRender {
     check(options_);
     const Plan plan = make_plan(options_);
     for (const int frame : frames_) {
+      if (options_.request().resume) remove_empty(frame_options(options_, frame).request().output);
       outputs_.push_back(files_of(frame_options(options_, frame)));
       check_earlier_films(plan, frame_options(options_, frame).request());
       if (const std::string scene = frame_options(options_, frame).scene; has_many_scenes() && !fs::exists(scene))
@@ -177,8 +211,7 @@ class SequenceRender {
   std::string stem() const { return fs::path(options_.scene).stem().string(); }
   bool has_many_scenes() const { return is_frame_pattern(options_.scene); }
 
-  /// Files with animations of their own are loaded again for each frame: the first time tells of the scene, and says
-  /// where the camera stands if the file has none.
+  /// Files with animations of their own are loaded again for each frame: the first time tells of the scene.
   void load_scene(const RenderOptions& options, std::span<Outputs> outputs) {
     const bool again = scene_ && scene_->is_animated && !has_many_scenes();
     ProgressLine progress(stem(), options.quiet);
@@ -187,8 +220,7 @@ class SequenceRender {
     scene_.reset();  // two might not fit in memory
     scene_ = load(options);
     load_seconds_ = watch.seconds() - scene_->scene->build_seconds();
-    const bool is_framed = std::ranges::count(scene_->added, scene_->sensor) > 0;
-    if (!again || !is_framed) own_camera_ = scene_->camera->settings().to_world;
+    if (!again || !is_framed(*scene_)) own_camera_ = own_camera(options, *scene_);
     progress.finish();
     for (Outputs& of_frame : outputs) of_frame.reads(scene_->files);
     if (!again) warn_of_scene(options, *scene_);
@@ -208,8 +240,11 @@ class SequenceRender {
     const std::string made_of = frame_made_of(one, *scene_, now, before, follows ? last_made_of_ : "");
     last_frame_ = frame, last_made_of_ = made_of, last_camera_ = now;
     if (request.resume && is_complete(request.output, made_of, relmse_goal(request))) {
-      if (!options_.quiet) fmt::print(stderr, "{}: complete\n", request.output);
-      return;
+      const std::string damage = damage_of(request.output);
+      if (damage.empty() && !options_.quiet) fmt::print(stderr, "{}: complete\n", request.output);
+      if (damage.empty()) return;
+      fmt::print(stderr, "warning: {}; the frame is rendered again\n", damage);
+      request.resume = false, request.overwrite = true;
     }
     trace_motion(before, times_.time(frame - 1), *scene_, request);
     request.attributes[film_key::kMadeOf] = made_of;
@@ -281,7 +316,7 @@ void take_frame(RenderOptions& options) {
 void place_frame(const RenderOptions& options, LoadedScene& scene) {
   const FrameTimes times(options);
   const int frame = options.sequence.frames->first;
-  times.place(frame, times.camera(scene, frame).value_or(scene.camera->settings().to_world), scene);
+  times.place(frame, times.camera(scene, frame).value_or(own_camera(options, scene)), scene);
 }
 
 }  // namespace covary

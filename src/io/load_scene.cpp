@@ -41,8 +41,9 @@ class Loader {
     jobs_.run(diagnostics_);
     assemble();
     for (const auto& file : files_.files()) result_.files.push_back(file.first);
-    result_.files_hash = result_.content_hash =
-        files_.content_hash(hash_text(xml_.hash) + text_of(options_.view, result_.added));
+    SceneView v = options_.view;  // the camera that is used without a name is no other by its name
+    if (const ObjectPtr first = first_sensor(*xml_.scene); first ? sensor_ == first : is_model_) v.camera.clear();
+    result_.files_hash = result_.content_hash = files_.content_hash(hash_text(xml_.hash) + text_of(v, result_.added));
     result_.warnings = diagnostics_.warnings();
     diagnostics_.throw_if_errors();
     require_table_memory(name, parts_);
@@ -335,8 +336,7 @@ class Loader {
     if (options_.width > 0 || options_.height > 0) {
       if (options_.width > 0) film.width = options_.width;
       if (options_.height > 0) film.height = options_.height;
-      film.crop_x = film.crop_y = 0;
-      film.crop_width = film.width, film.crop_height = film.height;
+      film.crop_x = film.crop_y = 0, film.crop_width = film.width, film.crop_height = film.height;
     }
     result_.width = film.width, result_.height = film.height;
     result_.crop_x = film.crop_x, result_.crop_y = film.crop_y;

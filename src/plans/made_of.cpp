@@ -22,7 +22,9 @@ constexpr const char* kOfTheFile[] = {"output",     "passes",   "resume",       
                                       "checkpoint", "exposure", "save-training", "no-preview"};
 constexpr const char* kGoals[] = {"spp", "time", "until", "max-spp"};
 constexpr const char* kScene = "scene";
-/// Options and places that the scene's hash covers, too.
+/// Options that change nothing but the scene, whose hash tells whether they do: "auto" may mean what is named.
+constexpr const char* kOfSceneAlone[] = {"background", "camera", "environment"};
+/// Options and places that explain another hash of the scene.
 constexpr const char* kOfScene[] = {"background",     "camera",     "define",     "environment",
                                     "ignore-unknown", "resolution", kMadeAtPlace, kMadeAtTime};
 
@@ -71,15 +73,17 @@ std::string differences(const std::string& earlier, const std::string& now, bool
     const auto found = lines.find(name);
     return found == lines.end() ? "default" : found->second.empty() ? "on" : found->second;
   };
+  const bool is_same_scene = value_in(before, kScene) == value_in(after, kScene);
   for (const std::string& name : names) {
     const std::string old_value = value_in(before, name), new_value = value_in(after, name);
     if (old_value == new_value || name == kScene || (continues && is_among(kGoals, name))) continue;
+    if (is_same_scene && is_among(kOfSceneAlone, name)) continue;
     if (name == kMadeAfter && (!before.contains(name) || !after.contains(name))) continue;  // told as the history
     scene_explained = scene_explained || is_among(kOfScene, name);
     text += text.empty() ? "" : "; ";
     text += is_hash(name) ? fmt::format("another {}", name) : fmt::format("{} {}, now {}", name, old_value, new_value);
   }
-  if (!scene_explained && value_in(before, kScene) != value_in(after, kScene))
+  if (!scene_explained && !is_same_scene)
     text += fmt::format("{}another scene, or a changed one", text.empty() ? "" : "; ");
   return text;
 }

@@ -31,6 +31,13 @@ TEST(MadeOf, NamesWhatChangedTheScene) {
   EXPECT_EQ(differences(first, made_of("g", {{{"spp", "16"}, {"camera", "2"}}})), "another scene, or a changed one");
 }
 
+TEST(MadeOf, TheSameSceneInOtherWordsIsTheSame) {
+  const std::string usual = made_of("h", {{{"spp", "16"}}});
+  const OptionValues named = {{"spp", "16"}, {"camera", "auto"}, {"environment", "studio"}};
+  EXPECT_EQ(differences(usual, made_of("h", {named})), "");
+  EXPECT_EQ(differences(usual, made_of("g", {named})), "camera default, now auto; environment default, now studio");
+}
+
 TEST(MadeOf, NamesPlacesWithoutTheirHashes) {
   const auto at = [](const char* place, const char* after) {
     return made_of("h", {{{kMadeAtPlace, place}, {kMadeAfter, after}, {kMadeAtTime, "1"}}});

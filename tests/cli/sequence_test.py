@@ -115,6 +115,18 @@ class Frames(SequenceTest):
         self.assertEqual(self.picture("same_1.exr"), self.picture("own_2.exr"))
         self.assertLess(max(abs(m) for m in self.channels("own_2.exr")["Motion.X"]), 1e-3)
 
+    def test_resume_renders_damaged_frames_again(self):
+        self.good_render("-o", "f_#.exr", frames="1-3")
+        whole = [(self.path / f"f_{frame}.exr").read_bytes() for frame in (1, 2, 3)]
+        middle = len(whole[1]) // 2
+        self.write("f_2.exr", whole[1][:middle] + bytes(100) + whole[1][middle + 100:])
+        self.write("f_3.exr", b"")
+        result = self.render("-o", "f_#.exr", "--resume", frames="1-3")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertRegex(result.stderr, "warning: f_2.exr: .*; the frame is rendered again")
+        for frame in (1, 2, 3):
+            self.assertEqual(read_exr((self.path / f"f_{frame}.exr").read_bytes()), read_exr(whole[frame - 1]), frame)
+
     def test_resume_renders_what_is_missing(self):
         self.good_render("-o", "f_#.exr")
         whole = {n: (self.path / f"f_{n}.exr").read_bytes() for n in range(1, 5)}
@@ -327,6 +339,21 @@ class GltfAnimation(SequenceTest):
         self.assertAlmostEqual(third - first, 0.2 * width, delta=0.7)
         self.good("render", "moving.gltf", *QUIET, *SMALL_WORDS, *view, "--frames", "2", "--fps", "2", "-o", "g_#.exr")
         self.assertNotEqual(self.picture("g_2.exr"), self.picture("f_00.exr"))
+
+    def test_frames_of_other_commands_are_seen_from_the_same_place(self):
+        """Of a file without a camera: where a farm's commands begin does not matter."""
+        words = ("render", "moving.gltf", *QUIET, *SMALL_WORDS, "--environment", "white")
+        self.good(*words, "--frames", "0-48:24", "-o", "a_##.exr")
+        self.good(*words, "--frames", "24-48:24", "-o", "b_##.exr")
+        self.assertEqual(self.place("a_48.exr"), self.place("b_48.exr"))
+        self.good(*words, "--camera", "auto", "--frames", "48", "-o", "a_##.exr", "--resume")
+
+    def test_the_usual_camera_by_name_is_the_same(self):
+        words = ("render", "moving.gltf", *QUIET, *SMALL_WORDS, "-o", "a.exr")
+        self.good(*words)
+        self.good(*words, "--camera", "auto", "--environment", "studio")
+        result = self.run_covary(*words, "--environment", "sky")
+        self.assertIn("other settings (environment default, now sky)", result.stderr)
 
 
 class Denoise(SequenceTest):
