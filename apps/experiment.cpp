@@ -13,6 +13,7 @@
 #include "combine/registry.h"
 #include "commands.h"
 #include "core/error.h"
+#include "core/known_names.h"
 #include "declared_options.h"
 #include "experiment_run.h"
 #include "film/output_folder.h"
@@ -58,8 +59,10 @@ lab::Suite builtin(const std::string& name) {
   if (found != lab::builtin_suites().end()) return lab::parse_suite(std::string(found->second), name + ".json");
   std::vector<std::string> names = names_of(lab::builtin_suites());
   for (const std::string& paper : names_of(lab::builtin_papers())) names.push_back(paper);
-  throw Error(ErrorCode::kUsage, fmt::format("no suite is named '{}'{}; expected SUITE.json, SCENE.xml or one of {}",
-                                             name, did_you_mean(name, names), fmt::join(names, ", ")));
+  throw Error(ErrorCode::kUsage,
+              fmt::format("no suite is named '{}'", name) +
+                  hint_and_list(name, names,
+                                fmt::format("expected SUITE.json, a scene or one of {}", fmt::join(names, ", "))));
 }
 
 /// The suite, not yet changed by the command's options.
@@ -145,7 +148,7 @@ void add_methods_of_programs(const lab::Programs& programs, bool renders, lab::S
 void experiment(ExperimentCommand command) {
   if (command.list) return list_suites();
   if (command.suite.empty())
-    throw Error(ErrorCode::kUsage, "no suite given; expected SUITE.json, SCENE.xml or a name that --list shows");
+    throw Error(ErrorCode::kUsage, "no suite given; expected SUITE.json, a scene or a name that --list shows");
   if (!command.seeds.empty()) command.overrides.seeds = parse_seeds(command.seeds);
   for (uint32_t spp : command.spp) command.overrides.budgets.push_back({spp, 0});
   for (double seconds : command.seconds) command.overrides.budgets.push_back({0, seconds});
@@ -192,7 +195,7 @@ void add_experiment(CLI::App& app) {
   const auto o = std::make_shared<ExperimentCommand>();
   CLI::App* command = app.add_subcommand("experiment", "Compare methods over scenes, budgets and seeds");
   add_value(*command, "SUITE", o->suite, kFileValue,
-            "A suite (JSON), a scene (XML), or the name of a built-in suite or paper");
+            "A suite (JSON), a scene (Mitsuba, pbrt, glTF), or the name of a built-in suite or paper");
   add_value(*command, "-o,--output", o->output, kFolderValue, "Folder for report.html, results.json and results.csv");
   command->add_flag("--list", o->list, "List the built-in suites and papers");
   command->add_flag("--print", o->print, "Print the suite as it would be run, to start your own from");

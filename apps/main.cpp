@@ -112,7 +112,7 @@ std::string describe_extra(const CLI::App& app) {
     return fmt::format("unknown option '{}': write {}{}", extra, present, help);
   const std::vector<std::string> near = near_options(command, extra);
   const std::string question = near.empty() ? "" : fmt::format("; did you mean '{}'?", fmt::join(near, "' or '"));
-  return "unknown option '" + extra + "'" + question + help;
+  return "unknown option '" + extra + "'" + (question.empty() ? help : question + " See" + help.substr(5));
 }
 
 int run(int argc, char** argv) {

@@ -14,6 +14,7 @@
 #include "command_description.h"
 #include "commands.h"
 #include "core/error.h"
+#include "core/known_names.h"
 #include "core/shell_text.h"
 #include "declared_options.h"
 #include "io/scene_formats.h"
@@ -39,19 +40,25 @@ std::map<std::string, std::string> builtin_scenes() {
   std::error_code ignored;
   for (const fs::path& tree : {beside / ".." / "share" / "covary", beside / ".." / ".."})
     for (const fs::directory_entry& entry : fs::directory_iterator(tree / "scenes", ignored))
-      if (const fs::path& file = entry.path(); file.extension() == ".xml")
+      if (const fs::path& file = entry.path(); is_scene_file(file.string()))
         files.emplace(file.stem().string(), file.lexically_normal().string());
   return files;
 }
 
 /// A word that is no file's name, and no scene's, is an error.
 void check_scene_name(const std::string& word) {
-  if (fs::path(word).filename() != word || fs::path(word).has_extension() || fs::exists(word)) return;
+  if (fs::exists(word)) return;
+  const fs::path given = word;
+  if (const std::string stem = given.stem().string(); given.has_extension() && builtin_scenes().contains(stem))
+    throw Error(ErrorCode::kIo, fmt::format("there is no file '{}'; the built-in scene is called '{}'", word, stem));
+  if (given.filename() != word || given.has_extension()) return;
   std::vector<std::string> names;
   for (const auto& [name, path] : builtin_scenes()) names.push_back(name);
-  const std::string known = names.empty() ? "" : fmt::format("; built-in are {}", fmt::join(names, ", "));
-  throw Error(ErrorCode::kIo, fmt::format("there is no file '{}', and no built-in scene of that name{}{}", word,
-                                          did_you_mean(word, names), known));
+  throw Error(ErrorCode::kIo,
+              fmt::format("there is no file '{}', and no built-in scene of that name", word) +
+                  hint_and_list(
+                      word, names,
+                      fmt::format("built-in are {}", names.empty() ? "none" : fmt::to_string(fmt::join(names, ", ")))));
 }
 
 }  // namespace
@@ -60,6 +67,9 @@ void check_options(RenderOptions& options) {
   check_scene_name(options.scene);
   options.settings = settings_from<RenderSettings>(options.values);
   options.sequence = settings_from<SequenceSettings>(options.of_sequence);
+  if (std::string& path = options.sequence.camera_path; !path.empty() && !fs::exists(path))
+    if (const fs::path beside = fs::path(options.scene).parent_path() / path; fs::exists(beside))
+      path = beside.string();
   RenderSettings& settings = options.settings;
   if (!options.is_replay() && settings.request.output.empty())
     usage("no output given; use -o OUT.exr (or --replay X,Y,SAMPLE)");

@@ -11,6 +11,7 @@
 
 #include "commands.h"
 #include "core/error.h"
+#include "core/known_names.h"
 #include "declared_options.h"
 #include "io/load_scene.h"
 #include "lab/suite.h"
@@ -54,8 +55,9 @@ std::map<std::string, KnownScene> known_scenes(const std::vector<std::string>& o
   for (const auto& [name, text] : lab::builtin_suites()) names.push_back(name);
   for (const std::string& name : only)
     if (!lab::builtin_suites().contains(name))
-      throw Error(ErrorCode::kUsage, fmt::format("no suite is named '{}'{}; expected {}", name,
-                                                 did_you_mean(name, names), fmt::join(names, ", ")));
+      throw Error(ErrorCode::kUsage,
+                  fmt::format("no suite is named '{}'", name) +
+                      hint_and_list(name, names, fmt::format("expected {}", fmt::join(names, ", "))));
   std::map<std::string, KnownScene> scenes;
   for (const std::string& name : only.empty() ? names : only) {
     const lab::Suite suite = lab::parse_suite(std::string(lab::builtin_suites().at(name)), name);

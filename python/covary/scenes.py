@@ -10,9 +10,13 @@ from .errors import IoError, UsageError
 _FOLDER = Path(__file__).parent / "share" / "covary" / "scenes"  # where the package's program looks, too
 
 
+def _files() -> dict[str, Path]:
+    return {file.stem: file for file in _FOLDER.glob("*.*") if file.suffix in (".xml", ".pbrt")}
+
+
 def names() -> list[str]:
     """The names of all of them."""
-    return sorted(file.stem for file in _FOLDER.glob("*.xml"))
+    return sorted(_files())
 
 
 def _file_of(scene: str) -> str:
@@ -20,16 +24,16 @@ def _file_of(scene: str) -> str:
     Raises IoError for a word that is neither."""
     if "/" in scene or Path(scene).suffix or Path(scene).exists():
         return scene
-    if scene not in names():
+    files = _files()
+    if scene not in files:
         raise IoError(f"cannot read '{scene}': there is no such file, and covary comes with no scene of that name, but "
                       f"with {', '.join(names())}")
-    return str(_FOLDER / f"{scene}.xml")
+    return str(files[scene])
 
 
 @checked(name=text)
 def path(name: str) -> Path:
     """The file of the scene of this name, for Scene.load() and render()."""
-    file = _FOLDER / f"{name}.xml"
     if name not in names():
         raise UsageError(f"name: found {name!r}; expected one of {', '.join(names())}")
-    return file
+    return _files()[name]

@@ -123,11 +123,10 @@ std::string FileResolver::find(const std::string& name, const SourceLocation& wh
     const std::string shown = folder.empty() ? "." : folder.string();
     if (searched.find("'" + shown + "'") != std::string::npos) continue;
     searched += (searched.empty() ? "'" : ", '") + shown + "'";
-    for_entries(folder, [&](const fs::path& entry) {
-      neighbours.push_back((fs::path(portable).parent_path() / entry.filename()).string());
-    });
+    for_entries(folder, [&](const fs::path& entry) { neighbours.push_back(entry.filename().string()); });
   }
-  diagnostics.error(where, fmt::format("file '{}' not found in {}{}", name, searched, did_you_mean(name, neighbours)));
+  const std::string hint = did_you_mean(fs::path(portable).filename().string(), neighbours);
+  diagnostics.error(where, fmt::format("file '{}' not found in {}{}", name, searched, hint));
   return "";
 }
 

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cctype>
 
+#include "core/known_names.h"
+
 namespace covary {
 namespace {
 
@@ -126,9 +128,8 @@ void XmlDefines::report_unused(const std::string& file, Diagnostics& diagnostics
   for (const auto& [name, entry] : entries_)
     if (entry.external && !entry.used)
       diagnostics.error(
-          {file},
-          fmt::format("the scene does not use the parameter '{}' that was defined from outside{}; {}", name,
-                      did_you_mean(name, known), list.empty() ? "it has no parameters" : "its parameters are " + list));
+          {file}, fmt::format("the scene does not use the parameter '{}' that was defined from outside", name) +
+                      hint_and_list(name, known, list.empty() ? "it has no parameters" : "its parameters are " + list));
 }
 
 // ---- XmlAttributes --------------------------------------------------------------------------------------------------

@@ -48,15 +48,15 @@ TEST(XmlReader, ReportsUndefinedAndUnusedParameters) {
             "Or give it a value by -D sp=VALUE, or by <default name=\"sp\" value=\"…\"/>");
   EXPECT_TRUE(contains(read_scene("<bsdf type=\"$kind\"/>").errors,
                        "'$kind' is not defined; give it a value by -D kind=VALUE, or by <default name=\"kind\""));
-  EXPECT_EQ(read_scene("<default name=\"spp\" value=\"16\"/><default name=\"depth\" value=\"3\"/>",
-                       {{"samples", "4"}, {"sp", "3"}})
-                .errors,
-            "scene.xml: the scene does not use the parameter 'samples' that was defined from outside; its parameters "
-            "are 'depth', "
-            "'spp'\n"
-            "scene.xml: the scene does not use the parameter 'sp' that was defined from outside; did you mean 'spp'?; "
-            "its parameters "
-            "are 'depth', 'spp'");
+  EXPECT_EQ(
+      read_scene("<default name=\"spp\" value=\"16\"/><default name=\"depth\" value=\"3\"/>",
+                 {{"samples", "4"}, {"sp", "3"}})
+          .errors,
+      "scene.xml: the scene does not use the parameter 'samples' that was defined from outside; its parameters "
+      "are 'depth', "
+      "'spp'\n"
+      "scene.xml: the scene does not use the parameter 'sp' that was defined from outside; did you mean 'spp'? Its "
+      "parameters are 'depth', 'spp'");
   EXPECT_EQ(read_scene("", {{"a", "4"}}).errors,
             "scene.xml: the scene does not use the parameter 'a' that was defined from outside; it has no parameters");
 }

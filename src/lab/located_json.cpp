@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/json_depth.h"
+#include "core/known_names.h"
 #include "core/printable.h"
 
 namespace covary::lab {
@@ -248,7 +249,7 @@ void ObjectReader::finish() {
   for (const auto& [name, value] : object_.items())
     if (std::find(known_.begin(), known_.end(), name) == known_.end())
       problem(name,
-              fmt::format("unknown key{}; known keys are {}", did_you_mean(name, known_), fmt::join(known_, ", ")));
+              "unknown key" + hint_and_list(name, known_, fmt::format("known keys are {}", fmt::join(known_, ", "))));
 }
 
 }  // namespace covary::lab

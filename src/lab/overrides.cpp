@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/known_names.h"
 #include "lab/plan.h"
 
 namespace covary::lab {
@@ -35,8 +36,9 @@ void keep(const char* what, const std::vector<std::string>& words, std::vector<E
   const std::vector<std::string> names = split_names(words, known);
   for (const std::string& name : names)
     if (std::find(known.begin(), known.end(), name) == known.end())
-      throw Error(ErrorCode::kUsage, fmt::format("the suite has no {} '{}'{}; it has '{}'", what, name,
-                                                 did_you_mean(name, known), fmt::join(known, "', '")));
+      throw Error(ErrorCode::kUsage,
+                  fmt::format("the suite has no {} '{}'", what, name) +
+                      hint_and_list(name, known, fmt::format("it has '{}'", fmt::join(known, "', '"))));
   std::erase_if(entries, [&](const Entry& e) { return std::find(names.begin(), names.end(), e.name) == names.end(); });
 }
 

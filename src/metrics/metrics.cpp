@@ -12,6 +12,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/known_names.h"
 #include "metrics/flip.h"
 
 namespace covary {
@@ -268,8 +269,9 @@ const MetricInfo& find_metric(const std::string& name) {
     if (info.name == name) return info;
     names.push_back(info.name);
   }
-  throw Error(ErrorCode::kUsage, fmt::format("unknown metric '{}'{}; expected one of {}", name,
-                                             did_you_mean(name, names), fmt::join(names, ", ")));
+  throw Error(ErrorCode::kUsage,
+              fmt::format("unknown metric '{}'", name) +
+                  hint_and_list(name, names, fmt::format("expected one of {}", fmt::join(names, ", "))));
 }
 
 MetricResult compute_metric(Metric metric, ComparedRows& rows, bool low_dynamic_range, bool with_map) {

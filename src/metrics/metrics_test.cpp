@@ -139,7 +139,7 @@ TEST(Metrics, LargestFloats) {
 TEST(Metrics, NamesAndSizes) {
   for (const MetricInfo& info : metrics()) EXPECT_EQ(find_metric(info.name).metric, info.metric);
   EXPECT_TRUE(contains(message_of([] { find_metric("relmsee"); }),
-                       "unknown metric 'relmsee'; did you mean 'relmse'?; expected one of relmse, relmse-trimmed, mse, "
+                       "unknown metric 'relmsee'; did you mean 'relmse'? Expected one of relmse, relmse-trimmed, mse, "
                        "mae, mape, flip"));
   EXPECT_TRUE(contains(message_of([] { value(Metric::kMse, Image(4, 3, 3), {Image(3, 4, 3)}); }),
                        "the image has 4 x 3 pixels, the reference 3 x 4"));

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/known_names.h"
 #include "lab/located_json.h"
 
 namespace covary::lab {
@@ -70,8 +71,8 @@ std::vector<PaperPart> chosen(const Paper& paper, const Words& only) {
   for (const PaperPart& part : paper.parts) known.insert(known.end(), part.names.begin(), part.names.end());
   for (const std::string& name : only)
     if (std::find(known.begin(), known.end(), name) == known.end())
-      throw Error(ErrorCode::kUsage, fmt::format("--only: '{}' has no part '{}'{}; it has {}", paper.name, name,
-                                                 did_you_mean(name, known), fmt::join(known, ", ")));
+      throw Error(ErrorCode::kUsage, fmt::format("--only: '{}' has no part '{}'", paper.name, name) +
+                                         hint_and_list(name, known, fmt::format("it has {}", fmt::join(known, ", "))));
   std::vector<PaperPart> parts;
   for (const PaperPart& part : paper.parts)
     if (only.empty() ||

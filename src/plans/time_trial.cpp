@@ -145,16 +145,18 @@ void PlanRun::plan_time_limit() {
   if (stopped()) return;
   // Where a later phase's samples depend on a denoised first pass, that takes as long as the image.
   const double between = static_cast<double>(plan_.phases.size() - 1) * costs_.end;
-  const double left = request_.seconds - watch_.seconds();
+  const double passed = watch_.seconds(), left = request_.seconds - passed;
   TimePlan plan = plan_time(costs_, left - between, sum_of_groups(passes_with(1)), aov_samples_);
   plan.seconds += between;
   if (plan.seconds > left && callbacks_.warning)
     callbacks_.warning(fmt::format(
-        "`time` {:g} is too short: the minimum takes about {:.2g} s ({}{:.2g} for {} samples per pixel, {:.2g} for the "
-        "image and its files)",
-        request_.seconds, watch_.seconds() + plan.seconds,
+        "`time` {:g} is too short: the minimum takes about {:.2g} s ({:.2g} for trials of the speed, {}{:.2g} for {} "
+        "per "
+        "pixel, {:.2g} for the image and its files)",
+        request_.seconds, passed + plan.seconds, passed,
         costs_.auxiliary > 0 ? fmt::format("{:.2g} for auxiliary images, ", plan.aov_samples * costs_.auxiliary) : "",
-        plan.samples * costs_.sample, plan.samples, between + costs_.end));
+        plan.samples * costs_.sample, plan.samples == 1 ? "1 sample" : fmt::format("{} samples", plan.samples),
+        between + costs_.end));
   if (needs_aovs()) aov_samples_ = plan.aov_samples;
   // No more groups are begun than can be filled if the trials were wrong by a factor of two; an error needs groups.
   const uint32_t fewest = request_.until > 0 ? state_.budget : 1;

@@ -87,7 +87,8 @@ class Help(CliTest):
         self.bad(2, "unknown option '--verzion'; did you mean '--version'", "--verzion")
         self.bad(2, "unknown option '--refrence'; did you mean '--reference'", "compare", "a.exr", "--refrence",
                  "b.exr")
-        self.bad(2, "unknown option '--sp'; did you mean '--spp'?; see", "render", "a.xml", "--sp", "8")
+        self.bad(2, "unknown option '--sp'; did you mean '--spp'? See 'covary render --help'", "render", "a.xml",
+                 "--sp", "8")
         self.bad(2, "unknown option '--resol'; did you mean '--resolution'?", "render", "a.xml", "--resol", "8x8")
         self.bad(2, "--reference is required; see 'covary compare --help'", "compare", "a.exr")
         self.bad(2, "too many arguments, beginning with 'b.exr'", "info", "a.exr", "b.exr")

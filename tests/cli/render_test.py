@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 import shlex
 import signal
 import statistics
@@ -352,8 +353,10 @@ class Files(RenderTest):
                   for image, scene in (("name.exr", "room"), ("file.exr", ROOM))
                   if self.good("render", scene, *SMALL, "--spp", "4", "--estimator", "none", "-o", image)]
         self.assertEqual(*hashes)
-        self.bad(1, "there is no file 'rooom', and no built-in scene of that name; did you mean 'room'?; built-in are "
+        self.bad(1, "there is no file 'rooom', and no built-in scene of that name; did you mean 'room'? Built-in are "
                     "box, ", "render", "rooom", "-o", "out.exr")
+        self.bad(1, "there is no file 'scenes/room.xml'; the built-in scene is called 'room'", "render",
+                 "scenes/room.xml", "-o", "out.exr")
         (self.path / "room").write_text("not a scene")  # a file of this name comes first
         self.bad(1, "room", "render", "room", *SMALL, "-o", "out.exr")
 
@@ -548,8 +551,11 @@ class Time(RenderTest):
             with self.subTest(options):
                 result = self.good("render", ROOM, "--resolution", "200x150", "-o", "a.exr", "--overwrite",
                                    "--time", "0.001", *options)
-                self.assertRegex(result.stderr, r"warning: --time 0.001 is too short: the minimum takes about "
-                                                r"[0-9.e-]+ s \(")
+                told = re.search(r"warning: --time 0.001 is too short: the minimum takes about (.*) s \((.*)\)",
+                                 result.stderr)
+                self.assertRegex(told[2], r"1 sample per pixel|[2-9]\d* samples per pixel")
+                parts = [float(part.split()[0]) for part in told[2].split(", ")]
+                self.assertAlmostEqual(float(told[1]), sum(parts), delta=0.1 * float(told[1]))
                 late = result.stderr.find("was exceeded")
                 self.assertTrue(late < 0 or result.stderr.index("too short") < late, result.stderr)
 

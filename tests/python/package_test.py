@@ -38,10 +38,15 @@ class Import(PackageTest):
 
     def test_scenes(self):
         """Those of the repository, with their files; the program finds them beside itself, as in a wheel."""
-        self.assertEqual(covary.scenes.names(), sorted(file.stem for file in (SOURCE / "scenes").glob("*.xml")))
-        for name in covary.scenes.names():
-            loaded = covary.Scene.load(covary.scenes.path(name))
-            self.assertEqual(loaded.content_hash, covary.Scene.load(SOURCE / "scenes" / f"{name}.xml").content_hash)
+        self.assertEqual(covary.scenes.names(), sorted(file.stem for file in self.files()))
+        self.assertIn("spheres", covary.scenes.names())  # a pbrt scene
+        for file in self.files():
+            loaded = covary.Scene.load(file.stem)
+            self.assertEqual(loaded.path, str(covary.scenes.path(file.stem)))
+            self.assertEqual(loaded.content_hash, covary.Scene.load(file).content_hash)
+
+    def files(self):
+        return [file for file in (SOURCE / "scenes").iterdir() if file.suffix in (".xml", ".pbrt")]
 
     def test_all_names_exist(self):
         for name in covary.__all__:
