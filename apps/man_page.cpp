@@ -48,7 +48,7 @@ std::string man_page(const CLI::App& app, const std::string& version) {
       "[\\fIoptions\\fR]\n.br\n.B covary\n[\\fB\\-\\-help\\fR] [\\fB\\-\\-version\\fR]\n",
       escaped(version), "covary \\- " + escaped(app.get_description().substr(app.get_description().find(' ') + 1)));
   page +=
-      ".SH DESCRIPTION\n.B covary\nrenders scenes in the XML format of Mitsuba to images in OpenEXR files, combines "
+      ".SH DESCRIPTION\n.B covary\nrenders scenes of Mitsuba, pbrt and glTF to images in OpenEXR files, combines "
       "renders that share random\nnumbers with independent ones into images with less noise, and compares methods.\n"
       ".SH COMMANDS\n";
   for (const CommandDescription& command : describe_subcommands(app)) {

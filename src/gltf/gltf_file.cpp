@@ -104,6 +104,10 @@ GltfFile::GltfFile(std::string_view bytes, const std::string& name, FileResolver
   } catch (const std::exception& error) {  // from the JSON library
     problem = error.what();
   }
+  constexpr std::string_view kMissing = "File not found : ";
+  if (problem.starts_with(kMissing))
+    throw Error(ErrorCode::kInput, fmt::format("{}: names the file '{}', which is not there", name,
+                                               first_line(problem.substr(kMissing.size()))));
   if (!read || !problem.empty())
     throw Error(ErrorCode::kInput, fmt::format("{}: is not a readable glTF file: {}", name,
                                                problem.empty() ? "it ends too soon" : first_line(problem)));

@@ -187,7 +187,7 @@ TEST(Suite, KnowsWhereItsScenesLie) {
   std::ofstream(tree / "share/covary/scenes/installed.xml") << "<scene/>";
   Suite suite = parse_suite(kSuite, "small.json");
   Suite of_scene;
-  of_scene.scenes = {{.name = "own", .file = "/somewhere/own.pbrt"}};
+  of_scene.scenes.emplace_back().file = "/somewhere/own.pbrt";
   EXPECT_EQ(scenes_folder(of_scene, "own.pbrt", "/nowhere/covary"), std::filesystem::current_path().string());
   const auto found = [&](const std::string& word) { return scenes_folder(suite, word, tree / "bin/covary"); };
   suite.scenes[0].file = "installed.xml";

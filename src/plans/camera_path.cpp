@@ -5,7 +5,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <fstream>
 #include <initializer_list>
 #include <iterator>
@@ -65,7 +67,13 @@ TransformKey keyframe(const Json& value, size_t index) {
 CameraPath parse(const std::string& text) {
   if (line_nested_too_deep(text))
     throw Error(ErrorCode::kInput, fmt::format("arrays and objects nest deeper than {}", kMaxJsonDepth));
-  const Json json = Json::parse(text, nullptr, false);
+  Json json;
+  try {
+    json = Json::parse(text);
+  } catch (const Json::parse_error& error) {
+    const std::string_view what = error.what();
+    throw Error(ErrorCode::kInput, fmt::format("is no JSON: {}", what.substr(what.find("] ") + 2)));
+  }
   if (!json.is_object()) throw Error(ErrorCode::kInput, "expected a JSON object");
   check_members(json, {"frames_per_second", "keyframes"});
   const double rate = json.contains("frames_per_second") ? number(json["frames_per_second"], "'frames_per_second'") : 1;
@@ -90,7 +98,8 @@ CameraPath parse_camera_path(const std::string& text, const std::string& name) {
 CameraPath read_camera_path(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  if (!file) throw Error(ErrorCode::kIo, fmt::format("cannot read the camera path '{}'", path));
+  if (!file)
+    throw Error(ErrorCode::kIo, fmt::format("cannot read the camera path '{}': {}", path, std::strerror(errno)));
   return parse_camera_path(text, path);
 }
 

@@ -36,7 +36,8 @@ TEST(CameraPath, CountsFramesByTheirRate) {
 
 TEST(CameraPath, SaysWhatIsWrongAndWhere) {
   const std::string file = "camera path 'p.json': ";
-  EXPECT_EQ(problem_of("{"), file + "expected a JSON object");
+  EXPECT_EQ(problem_of("3"), file + "expected a JSON object");
+  EXPECT_TRUE(problem_of("{").starts_with(file + "is no JSON: parse error at line 1, column 2: ")) << problem_of("{");
   EXPECT_EQ(problem_of("{}"), file + "the array 'keyframes' is missing");
   EXPECT_EQ(problem_of(R"({"keyframes": []})"), file + "there are no keyframes");
   EXPECT_EQ(problem_of(R"({"frames": []})"),

@@ -72,7 +72,10 @@ std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const 
 
 const Integrator& integrator_of(const LoadedScene& scene) {
   const auto* integrator = dynamic_cast<const Integrator*>(scene.integrator.get());
-  COVARY_CHECK(integrator, "the scene was loaded with an integrator");
+  if (!integrator)
+    throw Error(ErrorCode::kUsage,
+                "the scene was loaded without an integrator; set LoadOptions::make_integrator, such as "
+                "to integrator_maker({})");
   return *integrator;
 }
 
