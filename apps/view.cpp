@@ -362,8 +362,8 @@ void view(const ViewOptions& options) {
   fmt::print("{}\n", path);
   std::fflush(stdout);
   if (!open_in_browser(path))
-    throw Error(ErrorCode::kIo, "no browser could be opened; open " + path +
-                                    " in one, or give the page a name by -o PAGE.html, which opens none");
+    fmt::print(stderr, "note: no browser could be opened; open {} in one, or give the page a name by -o PAGE.html\n",
+               path);
 }
 
 }  // namespace

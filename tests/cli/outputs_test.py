@@ -341,10 +341,10 @@ class View(OutputsTest):
         self.addCleanup(lambda: [p.unlink() for p in self.path.glob("covary-view-*")])
         environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
         done = self.run_covary("view", "a.exr", env={**environment, "TMPDIR": str(self.path)})
-        self.assertEqual(done.returncode, 1)
+        self.assertEqual(done.returncode, 0, "the page is there")
         page = done.stdout.strip()
         self.assertTrue(page.endswith(".html") and os.path.exists(page), done.stdout)
-        self.assertIn(f"covary: no browser could be opened; open {page} in one", done.stderr)
+        self.assertIn(f"note: no browser could be opened; open {page} in one", done.stderr)
         self.assertEqual(self.good("view", "a.exr", "-o", "b.html", env=environment).stdout, "")
 
 

@@ -716,7 +716,7 @@ class View(PageTest):
         self.assertEqual((Path(self.folder.name) / "opened").read_text(), result.stdout)
         self.assertIn("<title>a</title>", Path(result.stdout.strip()).read_text())
         result = self.covary("a.exr", env={"PATH": "/nowhere", "TMPDIR": self.folder.name})
-        self.assertEqual(result.returncode, 1)
+        self.assertEqual(result.returncode, 0, "the page is there")
         self.assertIn("no browser could be opened; open ", result.stderr)
 
     def test_wrong_usage(self):
