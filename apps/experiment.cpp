@@ -16,7 +16,7 @@
 #include "core/known_names.h"
 #include "declared_options.h"
 #include "experiment_run.h"
-#include "film/output_folder.h"
+#include "imageio/output_folder.h"
 #include "io/scene_formats.h"
 #include "json_output.h"
 #include "lab/suite.h"
@@ -59,10 +59,10 @@ lab::Suite builtin(const std::string& name) {
   if (found != lab::builtin_suites().end()) return lab::parse_suite(std::string(found->second), name + ".json");
   std::vector<std::string> names = names_of(lab::builtin_suites());
   for (const std::string& paper : names_of(lab::builtin_papers())) names.push_back(paper);
-  throw Error(ErrorCode::kUsage,
-              fmt::format("no suite is named '{}'", name) +
-                  hint_and_list(name, names,
-                                fmt::format("expected SUITE.json, a scene or one of {}", fmt::join(names, ", "))));
+  throw Error(
+      ErrorCode::kUsage,
+      fmt::format("no suite is named '{}'", name) +
+          hint_and_list(name, names, fmt::format("expected SUITE.json, a scene or one of {}", fmt::join(names, ", "))));
 }
 
 /// The suite, not yet changed by the command's options.

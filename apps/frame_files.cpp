@@ -16,6 +16,7 @@
 #include "core/number_text.h"
 #include "core/stopwatch.h"
 #include "declared_options.h"
+#include "film/film.h"
 #include "film/image_file.h"
 #include "frame_history.h"
 #include "imageio/exr_image.h"
@@ -37,6 +38,12 @@ std::vector<int> frames_of_all(const FrameOptions& o, const FramePatterns& patte
   return {frames.begin(), frames.end()};
 }
 
+/// Whether its render was interrupted.
+bool is_unfinished(const ImageInfo& image) {
+  const auto found = image.attributes.find(std::string("covary:") + film_key::kComplete);
+  return found != image.attributes.end() && found->second == "false";
+}
+
 /// What is wrong with the header of a frame; `first`: that of the sequence's first frame, if it was read.
 std::string problem_of(const std::string& path, std::optional<ImageInfo>& first) {
   try {
@@ -52,8 +59,11 @@ std::string problem_of(const std::string& path, std::optional<ImageInfo>& first)
     for (const auto& [a, b] : {std::pair{&*first, &info}, {&info, &*first}})
       for (const ExrFile::Channel& channel : a->channels)
         if (std::none_of(b->channels.begin(), b->channels.end(), [&](const auto& c) { return c.name == channel.name; }))
-          return fmt::format("'{}': the channel {} is {}", path, channel.name,
-                             b == &info ? "missing, which the first frame has" : "not in the first frame");
+          return fmt::format("'{}': the channel {} is {}{}", path, channel.name,
+                             b == &info ? "missing, which the first frame has" : "not in the first frame",
+                             is_unfinished(info) ? "; the frame is unfinished, and `covary render … --resume` ends it"
+                             : is_unfinished(*first) ? ", which is unfinished; `covary render … --resume` ends it"
+                                                     : "");
     return "";
   } catch (const Error& error) {
     return error.what();
@@ -182,7 +192,8 @@ void note_gaps(const FrameOptions& o, const std::vector<int>& frames, const Fram
   for (size_t i = 1; i < frames.size(); ++i)
     for (int frame = frames[i - 1] + 1; frame < frames[i]; ++frame) missing.push_back(frame);
   if (!missing.empty() && missing.size() < frames.size())
-    fmt::print(stderr, "note: '{}' has no frames {}\n", patterns.images[0], text_of(missing));
+    fmt::print(stderr, "note: '{}' has no frame{} {}\n", patterns.images[0], missing.size() == 1 ? "" : "s",
+               text_of(missing));
   for (const std::string& pattern : patterns.images) {
     std::vector<std::string> others;
     frames_on_disk(pattern, &others);

@@ -7,7 +7,7 @@
 #include <cstring>
 
 #include "core/error.h"
-#include "film/output_file.h"
+#include "imageio/output_file.h"
 
 namespace covary {
 namespace {

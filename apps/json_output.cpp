@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "json_output.h"
 
-#include <sys/resource.h>
 #include <cstdio>
+#include <fstream>
+#include <string>
 
-#include "film/output_file.h"
+#include "imageio/output_file.h"
 
 namespace covary {
 
@@ -20,9 +21,10 @@ void write_text_output(const std::string& path, const std::string& text) {
 }
 
 double peak_memory_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) * 1024;
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);)
+    if (double kibibytes = 0; std::sscanf(line.c_str(), "VmHWM: %lf", &kibibytes) == 1) return kibibytes * 1024;
+  return 0;
 }
 
 }  // namespace covary

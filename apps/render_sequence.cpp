@@ -80,12 +80,13 @@ bool is_complete(const std::string& path, const std::string& made_of, double unt
   const MadeFile file = made_file(path);
   if (!file.complete) return false;
   const std::string& earlier = file.made_of;
-  if (earlier == made_of || reaches(file, made_of, until)) return true;
-  throw Error(
-      ErrorCode::kInput,
-      fmt::format("--resume: '{}' is not a frame of this command ({}); --overwrite instead of --resume replaces "
-                  "it",
-                  path, earlier.empty() ? "no record of its settings" : differences(earlier, made_of)));
+  const std::string differ = earlier.empty() ? "no record of its settings" : differences(earlier, made_of);
+  if (differ.empty() || reaches(file, made_of, until)) return true;
+  const bool is_history = differ == fmt::format("another {}", kMadeAfter);
+  throw Error(ErrorCode::kInput,
+              fmt::format("--resume: '{}' is not a frame of this command ({}{}); --overwrite instead of --resume "
+                          "replaces it",
+                          path, differ, is_history ? ": it was rendered with another range of --frames" : ""));
 }
 
 /// Removes what a full disk or a killed copy left of a frame.

@@ -16,8 +16,8 @@
 #include "core/error.h"
 #include "core/printable.h"
 #include "core/stopwatch.h"
-#include "film/output_folder.h"
 #include "film/outputs.h"
+#include "imageio/output_folder.h"
 #include "settled_files.h"
 #include "usage_error.h"
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 from dataclasses import dataclass, field, fields
 from os import PathLike, fspath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _covary
@@ -79,11 +80,22 @@ class Result:
 
     @checked(path=path)
     def save(self, path: str | PathLike[str]) -> None:
-        """Writes the image in the format of the extension: .exr .pfm .tif .hdr .png .jpg."""
-        attributes = {"covary:estimator": self.estimator}
+        """Writes the image in the format of the extension: .exr .pfm .tif .hdr .png .jpg. EXR also holds std_error,
+        bias, aovs and the predicted error, and of a render its seed and its scene's hash."""
+        attributes = {f"covary:{name}": value for name, value in self._attributes().items()}
+        if Path(path).suffix.lower() == ".exr":
+            _covary.write_result(fspath(path), self.image, self.std_error, self.bias, self.aovs, attributes)
+        else:
+            _covary.write_image(fspath(path), self.image, attributes)
+
+    def _attributes(self) -> dict[str, str]:
+        """Of files, as programs write them."""
+        known = {"estimator": self.estimator}
         if self.samples_per_pixel is not None:
-            attributes["covary:samples"] = f"{self.samples_per_pixel:g}"
-        _covary.write_image(fspath(path), self.image, attributes)
+            known["samples"] = f"{self.samples_per_pixel:g}"
+        if self.predicted_bounds is not None:
+            known["predicted_relmse_80"] = " ".join(f"{bound:.4g}" for bound in self.predicted_bounds)
+        return known
 
     def to_dict(self) -> dict[str, Any]:
         """What is known of the image, without images: a row for `pandas.DataFrame([result.to_dict(), …])`."""
@@ -197,3 +209,8 @@ class RenderResult(Result):
     not_finite_samples: int
     negative_samples: int
     bad_samples: list[BadSample]
+
+    def _attributes(self) -> dict[str, str]:
+        of_film = next(iter(self.films.values())).attributes if self.films else {}
+        known = {name: of_film[name] for name in ("seed", "scene_hash", "settings", "version") if name in of_film}
+        return known | super()._attributes()

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "combine/grouped_file.h"
+#include "combine/result_file.h"
 #include "core/error.h"
 #include "denoising/denoise.h"
 #include "denoising/denoised_references.h"
@@ -26,15 +27,38 @@ nb::object read(const std::string& path, const std::string& layer, bool accept_c
   return array_of(std::move(image.image));
 }
 
-void write(const std::string& path, nb::object array, const std::map<std::string, std::string>& attributes) {
+void check_extension_of_image(const std::string& path) {
   const std::vector<std::string>& known = image_extensions();
   if (const std::string extension = lower_extension(path);
       std::find(known.begin(), known.end(), extension) == known.end())
     throw Error(ErrorCode::kUsage,
                 fmt::format("path: found '{}'; the name must end in {}", path, fmt::join(known, ", ")));
+}
+
+void write(const std::string& path, nb::object array, const std::map<std::string, std::string>& attributes) {
+  check_extension_of_image(path);
   const Image image = image_of(array, "image");
-  const ImagePlace place{image.width, image.height, {0, 0, image.width, image.height}};
-  run_work([&](WorkState&) { write_image(path, image, place, attributes); }, nb::none());
+  run_work([&](WorkState&) { write_image(path, image, {}, attributes); }, nb::none());
+}
+
+/// An EXR file of an image with its error and layers, as renders write it.
+void write_with_error(const std::string& path, nb::object array, nb::object std_error, nb::object bias, nb::dict aovs,
+                      const std::map<std::string, std::string>& attributes) {
+  EstimatorResult result;
+  result.estimate = image_of(array, "image");
+  if (!std_error.is_none()) result.std_error = image_of(std_error, "std_error");
+  if (!bias.is_none()) result.bias = image_of(bias, "bias");
+  std::map<std::string, Image> layers;
+  for (const auto& [key, layer] : aovs) {
+    const auto name = nb::cast<std::string>(key);
+    layers[name] = image_of(layer, "aovs: " + name);
+  }
+  const int width = result.estimate.width, height = result.estimate.height;
+  run_work(
+      [&](WorkState&) {
+        write_result(path, {width, height, {0, 0, width, height}}, attributes, result, layers);
+      },
+      nb::none());
 }
 
 nb::object read_groups(const std::vector<std::string>& paths, const std::string& layer) {
@@ -98,6 +122,10 @@ void bind_images(nb::module_& module) {
              nb::sig("def read_image(path: str, layer: str, accept_changed: bool = False) -> typing.Any"));
   module.def("write_image", &write, "path"_a, "image"_a.none(), "attributes"_a,
              nb::sig("def write_image(path: str, image: object, attributes: dict[str, str]) -> None"));
+  module.def("write_result", &write_with_error, "path"_a, "image"_a.none(), "std_error"_a.none(), "bias"_a.none(),
+             "aovs"_a, "attributes"_a,
+             nb::sig("def write_result(path: str, image: object, std_error: object | None, bias: object | None, aovs: "
+                     "dict[str, typing.Any], attributes: dict[str, str]) -> None"));
   module.def("read_groups", &read_groups, "paths"_a, "layer"_a,
              nb::sig("def read_groups(paths: list[str], layer: str) -> typing.Any"));
   module.def("metric", &metric, "name"_a, "image"_a.none(), "reference"_a.none(), "reference2"_a.none(),

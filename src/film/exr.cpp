@@ -261,10 +261,12 @@ void ExrFile::check_pixels() const {
   std::error_code ignored;
   const double file_bytes = static_cast<double>(std::filesystem::file_size(path_, ignored));
   if (memory > all_memory || min_bytes > file_bytes)
-    fail_input(path_,
-               fmt::format("the header says {} x {} pixels of {} channels, more than a file of {:.0f} bytes with "
-                           "compression '{}' or the memory can hold",
-                           place_.window.width, place_.window.height, file_values, file_bytes, compression_));
+    fail_input(path_, fmt::format("{}the header says {} x {} pixels of {} channels, more than {} can hold",
+                                  min_bytes > file_bytes ? "is damaged or cut off: " : "", place_.window.width,
+                                  place_.window.height, file_values,
+                                  min_bytes > file_bytes ? fmt::format("a file of {:.0f} bytes with compression '{}'",
+                                                                       file_bytes, compression_)
+                                                         : "the memory"));
 }
 
 const ExrFile::Channel* ExrFile::find(const std::string& name) const {

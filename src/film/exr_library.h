@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "film/exr.h"
-#include "film/output_file.h"
+#include "imageio/output_file.h"
 
 namespace covary {
 namespace Imf = OPENEXR_IMF_NAMESPACE;

@@ -17,7 +17,7 @@
 #include "film/exr.h"
 #include "film/exr_library.h"
 #include "film/image_writer.h"
-#include "film/output_file.h"
+#include "imageio/output_file.h"
 
 namespace covary {
 namespace {

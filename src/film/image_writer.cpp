@@ -11,8 +11,8 @@
 
 #include "core/error.h"
 #include "core/srgb.h"
-#include "film/output_file.h"
 #include "imageio/image_io.h"
+#include "imageio/output_file.h"
 #include "imageio/png.h"
 
 namespace covary {
@@ -123,9 +123,11 @@ std::string lower_extension(const std::string& path) {
   return extension;
 }
 
-void write_image(const std::string& path, const Image& linear, const ImagePlace& place,
+void write_image(const std::string& path, const Image& linear, const ImagePlace& given,
                  const std::map<std::string, std::string>& attributes, const Image& alpha) {
   COVARY_CHECK(linear.channels == 3, "a picture of 3 channels");
+  const ImagePlace whole{linear.width, linear.height, {0, 0, linear.width, linear.height}};
+  const ImagePlace& place = given == ImagePlace{} ? whole : given;
   const std::string extension = lower_extension(path);
   if (extension == ".exr") {
     Image copy = linear, copy_of_alpha = alpha;  // planes need mutable memory

@@ -44,6 +44,15 @@ PlacedImage written(const std::string& name, const Image& image) {
   return read_image(path);
 }
 
+TEST(ImageWriter, WithoutAPlaceTheImageIsTheFrame) {
+  for (const char* name : {"whole.exr", "whole.pfm"}) {
+    write_image(test_file(name), picture(), {}, {});
+    const PlacedImage read = read_image(test_file(name));
+    EXPECT_EQ(read.place, (ImagePlace{7, 5, {0, 0, 7, 5}})) << name;
+    EXPECT_EQ(read.image.data, picture().data) << name;
+  }
+}
+
 TEST(ImageWriter, PngKeepsEveryCode) {
   Image image(256, 2, 3);
   for (int i = 0; i < 256; ++i)

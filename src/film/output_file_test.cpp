@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Files appear complete or not at all.
-#include "film/output_file.h"
+#include "imageio/output_file.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

@@ -12,8 +12,8 @@
 #include "core/error.h"
 #include "film/image_file.h"
 #include "film/image_writer.h"
-#include "film/output_file.h"
-#include "film/output_folder.h"
+#include "imageio/output_file.h"
+#include "imageio/output_folder.h"
 
 namespace covary {
 namespace fs = std::filesystem;

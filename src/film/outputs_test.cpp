@@ -9,7 +9,7 @@
 #include <fstream>
 
 #include "film/image_writer.h"
-#include "film/output_file.h"
+#include "imageio/output_file.h"
 #include "support/files.h"
 
 namespace covary {

@@ -19,7 +19,7 @@
 
 #include "core/error.h"
 #include "core/shell_text.h"
-#include "film/output_file.h"
+#include "imageio/output_file.h"
 #include "lab/process.h"
 
 namespace covary::lab {

@@ -6,7 +6,7 @@
 #include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
-#include "film/output_file.h"
+#include "imageio/output_file.h"
 #include "support/files.h"
 
 namespace covary {

@@ -12,7 +12,7 @@
 
 #include "film/film_file.h"
 #include "film/image_file.h"
-#include "film/output_file.h"
+#include "imageio/output_file.h"
 #include "integrators/aov.h"
 #include "plans/estimator_plans.h"
 #include "plans/folder_lock.h"

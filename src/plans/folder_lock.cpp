@@ -13,7 +13,7 @@
 #include <filesystem>
 
 #include "core/error.h"
-#include "film/output_folder.h"
+#include "imageio/output_folder.h"
 
 namespace covary {
 namespace {

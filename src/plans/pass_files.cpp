@@ -15,9 +15,9 @@
 #include "core/error.h"
 #include "core/json_depth.h"
 #include "film/film_file.h"
-#include "film/output_file.h"
-#include "film/output_folder.h"
 #include "film/splat_layer.h"
+#include "imageio/output_file.h"
+#include "imageio/output_folder.h"
 #include "plans/made_of.h"
 
 namespace covary {

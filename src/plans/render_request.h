@@ -127,8 +127,11 @@ inline void declare(Settings& s, RenderRequest& r) {
            {.effect = OptionEffect::kPasses});
   r.layers = layers == "direct", r.light_groups = layers == "light-groups", r.path_lengths = layers == "path-lengths";
   s.group("Training of controlled-path and guided-path");
-  s.text("save-training", r.save_training, "FILE", "Save the training", {.names = OptionNames::kFile});
-  s.text("load-training", r.load_training, "FILE", "Use a saved training",
+  s.text("save-training", r.save_training, "FILE",
+         "Also write what controlled-path or guided-path has learnt about the scene to this file",
+         {.names = OptionNames::kFile});
+  s.text("load-training", r.load_training, "FILE",
+         "Render with what a render with `save-training` of the same scene and integrator has learnt",
          {.names = OptionNames::kFile, .effect = OptionEffect::kSamples});
   if (r.resume && r.overwrite) throw Error(ErrorCode::kUsage, "`overwrite` excludes `resume`");
 }

@@ -11,7 +11,7 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
-#include "film/output_file.h"
+#include "imageio/output_file.h"
 #include "metrics/error_map.h"
 #include "report/embedded.h"
 #include "report/image_block.h"

@@ -362,7 +362,7 @@ class Sequences(PicturesTest):
 
     def test_lines(self):
         said = self.good("denoise", "a.####.exr", "b.####.exr", *OFF, "-o", "o.####.exr").stderr
-        self.assertIn("note: 'a.####.exr' has no frames 3\n", said)
+        self.assertIn("note: 'a.####.exr' has no frame 3\n", said)
         self.assertIn("note: a.998.exr beside 'a.####.exr' are not its frames", said)
         self.assertRegex(said, r"\nframe 2 \(2 of 3\): o.0002.exr, predicted relMSE [\d.e-]+.*\n")
         self.assertRegex(said, r"\n3 frames in [\d.]+ s\n\Z")

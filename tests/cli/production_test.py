@@ -51,7 +51,7 @@ class LongSequence(CliTest):
         before = {p.name: p.stat().st_mtime_ns for p in self.path.glob("o.*.exr")}
         result = self.run_covary(*DENOISE, "--resume")
         self.assertEqual(result.returncode, 1)
-        self.assertIn("note: 'a.####.exr' has no frames 77\n", result.stderr)
+        self.assertIn("note: 'a.####.exr' has no frame 77\n", result.stderr)
         self.assertRegex(result.stderr, r"\n\d+ frames in [\d.]+ s; \d+ existed already: ")
         self.assertIn("2 of 239 frames are incomplete: 40, 160; files of ", result.stderr)
         good = [n for n in frames if n not in self.BAD]

@@ -170,6 +170,14 @@ class Frames(SequenceTest):
         self.assertIn("'parts_1.exr' is not a frame of this command",
                       self.render("-o", "parts_#.exr", "--resume", "--denoise", "auto", "--oidn", "off").stderr)
 
+    def test_parts_with_histories_of_their_own_are_no_whole(self):
+        quick = ("--denoise", "auto", "--oidn", "off", "--history", "on")
+        for frames in ("1-2", "3"):
+            self.good_render("-o", "f_#.exr", *quick, frames=frames)
+        errors = self.render("-o", "f_#.exr", *quick, "--resume", frames="1-3").stderr
+        self.assertIn("'f_3.exr' is not a frame of this command (another previous frame: it was rendered with another "
+                      "range of --frames)", errors)
+
     def test_interrupted(self):
         command = [COVARY, "render", "room.xml", *QUIET, "--resolution", "160x120", "--spp", "64", "--camera-path",
                    "path.json", "--frames", "1-400", "-o", "f_###.exr", "--denoise", "none"]
@@ -353,7 +361,7 @@ class GltfAnimation(SequenceTest):
         self.good(*words)
         self.good(*words, "--camera", "auto", "--environment", "studio")
         result = self.run_covary(*words, "--environment", "sky")
-        self.assertIn("other settings (environment default, now sky)", result.stderr)
+        self.assertIn("other settings (camera auto, now default; environment studio, now sky)", result.stderr)
 
 
 class Denoise(SequenceTest):

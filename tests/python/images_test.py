@@ -139,9 +139,23 @@ class Images(PackageTest):
         covary.combine(*pair()).save(self.path / "b.png")
         self.assertEqual(covary.read_image(self.path / "b.png").shape, (HEIGHT, WIDTH, 3))
 
-    def test_results_are_compared_as_objects(self):
-        one, two = (covary.combine(*pair()) for _ in range(2))
-        self.assertEqual(([one, two].index(two), len({one, two})), (1, 2))
+    def test_saved_results_are_whole(self):
+        """What is known of the error and the samples, too, as in the files of the program."""
+        result = covary.render("room", 24, "iicv", aovs=True, seed=7, crop=(100, 100, 24, 16), oidn="off")
+        self.assertEqual([result, result].index(result), 0)  # compared as objects
+        self.assertEqual(len({result, covary.combine(*pair())}), 2)
+        result.save(self.path / "a.exr")
+        self.assert_same_bits(covary.read_image(self.path / "a.exr"), result.image)
+        self.assert_same_bits(covary.read_image(self.path / "a.exr", "StdError"), result.std_error)
+        self.assert_same_bits(covary.read_image(self.path / "a.exr", "Albedo"), result.aovs["Albedo"])
+        info = subprocess.run([covary.program(), "info", self.path / "a.exr", "--json"], capture_output=True, text=True,
+                              check=True)
+        attributes = json.loads(info.stdout)["attributes"]
+        self.assertEqual((attributes["covary:seed"], attributes["covary:samples"]), ("7", "24"))
+        self.assertEqual(attributes["covary:scene_hash"], result.films["crn"].attributes["scene_hash"])
+        self.assertAlmostEqual(float(attributes["covary:predicted_relmse"]) / result.predicted_relmse, 1, 3)
+        for text, bound in zip(attributes["covary:predicted_relmse_80"].split(), result.predicted_bounds, strict=True):
+            self.assertAlmostEqual(float(text) / bound, 1, 3)
 
     def test_errors(self):
         missing = str(self.path / "missing.exr")

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "film/output_file.h"
+#include "imageio/output_file.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "film/output_folder.h"
+#include "imageio/output_folder.h"
 
 #include <fmt/format.h>
 
