@@ -119,16 +119,24 @@ def _how_read(**images: Any) -> str:
     for name, image in images.items():
         shape = tuple(getattr(image, "shape", ()))
         if len(shape) == 4 and shape[2] < min(shape[:2]):
-            texts.append(f"; {name}: the shape {list(shape)} was read as [T, H, W, 3], {shape[0]} groups of "
-                         f"{shape[2]} x {shape[1]} pixels, so that arrays [H, W, T, 3] need .transpose(2, 0, 1, 3)")
+            texts.append(f"; {_reading(name, shape)}")
     return texts[0] if texts else ""
 
 
+def _reading(name: str, shape: tuple[int, ...]) -> str:
+    return (f"{name}: the shape {list(shape)} was read as [T, H, W, 3], {shape[0]} groups of {shape[2]} x {shape[1]} "
+            "pixels, so that arrays [H, W, T, 3] need .transpose(2, 0, 1, 3)")
+
+
 def _groups_first(name: str, image: Any, found: list[str]) -> Any:
-    """The array with its groups first, as [T, H, W, 3], and a warning in `found` if they were last."""
+    """The array with its groups first, as [T, H, W, 3], and a warning in `found` if they were last, or may be."""
     shape = tuple(getattr(image, "shape", ()))
     turn = getattr(image, "permute", None) or getattr(image, "transpose", None)
-    if len(shape) != 4 or min(shape[:2]) <= _MANY_GROUPS or shape[2] > _FEW_COLUMNS or turn is None:
+    if len(shape) != 4 or shape[2] > min(_FEW_COLUMNS, *shape[:2]) or turn is None:
+        return image
+    if min(shape[:2]) <= _MANY_GROUPS:
+        if shape[2] < min(shape[:2]):
+            found.append(_reading(name, shape))
         return image
     found.append(f"{name}: the shape {list(shape)} was taken for [H, W, T, 3]; expected [T, H, W, 3]")
     return turn(2, 0, 1, 3)

@@ -75,6 +75,14 @@ class Layouts(PackageTest):
         self.assertEqual(covary.check_inputs(*(image.transpose(1, 2, 0, 3) for image in images)).crn_mean,
                          covary.check_inputs(*images).crn_mean)
 
+    def test_groups_that_may_be_last_are_told(self):
+        """Of small images, which are read as they should be."""
+        image = numpy.random.default_rng(6).gamma(2, 0.5, (48, 64, 8, 3)).astype(numpy.float32)
+        result = covary.combine(None, image, "none", denoise="auto", oidn="off", force=True)
+        self.assertEqual(result.image.shape, (64, 8, 3))
+        self.assertIn("independent: the shape [48, 64, 8, 3] was read as [T, H, W, 3], 48 groups of 8 x 64 pixels, so "
+                      "that arrays [H, W, T, 3] need .transpose(2, 0, 1, 3)", result.warnings)
+
     def test_inputs_stay_as_they_are(self):
         crn, independent = CRN.copy(), INDEPENDENT.copy()
         covary.combine(crn, independent)
