@@ -342,8 +342,8 @@ class Denoise(RenderTest):
                 planned.append(facts["planned_memory_bytes"]), taken.append(facts["peak_memory_bytes"])
             ratio = (planned[1] - planned[0]) / (taken[1] - taken[0])
             with self.subTest(layers=len(layers), renders=renders, ratio=ratio):
-                self.assertGreaterEqual(ratio, 1)
-                self.assertLessEqual(ratio, 1.3)
+                self.assertGreater(ratio, 0.95)  # processors differ in the width of their registers
+                self.assertLess(ratio, 1.3)
 
     def test_layers_add_up(self):
         """Of two renders, with and without a network, by covary denoise and combine."""
