@@ -82,7 +82,7 @@ std::vector<std::string> read_patterns(const FramePatterns& patterns) {
 bool is_finished(const std::string& path) {
   std::error_code ignored;
   const bool has_content = std::filesystem::file_size(path, ignored) > 0 && !ignored;
-  return is_complete_exr(path) || (has_content && !is_exr(path));
+  return is_finished_exr(path) || (has_content && !is_exr(path));
 }
 
 /// Takes frames out that a farm has not finished, unless their output is there, and returns them.

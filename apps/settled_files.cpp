@@ -8,6 +8,8 @@
 
 namespace covary {
 
+bool is_finished_exr(const std::string& path) { return is_complete_exr(path) && made_file(path).complete; }
+
 bool SettledFiles::is_settled(const std::string& path) {
   std::error_code no_size, no_time;
   const auto now = std::chrono::steady_clock::now();
@@ -18,7 +20,7 @@ bool SettledFiles::is_settled(const std::string& path) {
   }
   Seen& seen = seen_.try_emplace(path, found).first->second;
   if (seen.size != found.size || seen.written != found.written) seen = found;
-  return now - seen.since >= kSettled && is_complete_exr(path) && made_file(path).complete;
+  return now - seen.since >= kSettled && is_finished_exr(path);
 }
 
 }  // namespace covary

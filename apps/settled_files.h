@@ -12,6 +12,9 @@ namespace covary {
 
 /// Watches files by polling. A file is settled if it is an EXR file that is complete, and its size and time have not
 /// changed for kSettled by this machine's clock, whatever that of a file server says.
+/// Whether nothing more will be written to the EXR file: it is whole, and not of an interrupted render that continues.
+bool is_finished_exr(const std::string& path);
+
 class SettledFiles {
  public:
   static constexpr std::chrono::milliseconds kSettled{2000};

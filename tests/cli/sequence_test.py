@@ -12,6 +12,7 @@ from pathlib import Path
 
 from cli_test import COVARY, SLOWDOWN, CliTest
 from exr_reader import read_exr
+from exr_writer import film
 
 ROOM = (Path(os.environ["SCENES"]) / "room.xml").read_text()
 QUIET = ("--quiet", "--no-preview")
@@ -415,6 +416,17 @@ class Denoise(SequenceTest):
         finally:
             process.kill()
         self.assert_same_frames("watched", "all")
+
+    def test_resume_leaves_out_frames_of_interrupted_renders(self):
+        for n in (1, 2, 3):
+            for seed, name in enumerate("ab"):
+                complete = "false" if (name, n) == ("a", 2) else "true"
+                (self.path / f"{name}_{n}.exr").write_bytes(
+                    film(10 * n + seed, 1, (12, 9), value=seed + 1, sampling="independent", complete=complete))
+        said = self.denoise("a_#.exr", "b_#.exr", "-o", "d_#.exr", "--resume", "--force")
+        self.assertEqual(said.returncode, 1)
+        self.assertIn("1 of 3 frames are incomplete: 2", said.stderr)
+        self.assertEqual({p.name for p in self.path.glob("d_*.exr")}, {"d_1.exr", "d_3.exr"})
 
     def test_wrong_motion_and_seeds_are_found(self):
         wrong = self.denoise("a_#.exr", "b_#.exr", "-o", "d_#.exr", "--motion-scale=-1,-1")
