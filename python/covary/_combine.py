@@ -118,9 +118,14 @@ def _how_read(**images: Any) -> str:
     texts = []
     for name, image in images.items():
         shape = tuple(getattr(image, "shape", ()))
-        if len(shape) == 4 and shape[2] < min(shape[:2]):
+        if _may_be_last(shape):
             texts.append(f"; {_reading(name, shape)}")
     return texts[0] if texts else ""
+
+
+def _may_be_last(shape: tuple[int, ...]) -> bool:
+    """Whether an array could have its groups last: it has more groups, and rows, than columns."""
+    return len(shape) == 4 and shape[2] < min(shape[:2])
 
 
 def _reading(name: str, shape: tuple[int, ...]) -> str:
@@ -132,11 +137,10 @@ def _groups_first(name: str, image: Any, found: list[str]) -> Any:
     """The array with its groups first, as [T, H, W, 3], and a warning in `found` if they were last, or may be."""
     shape = tuple(getattr(image, "shape", ()))
     turn = getattr(image, "permute", None) or getattr(image, "transpose", None)
-    if len(shape) != 4 or shape[2] > min(_FEW_COLUMNS, *shape[:2]) or turn is None:
+    if not _may_be_last(shape) or shape[2] > _FEW_COLUMNS or turn is None:
         return image
     if min(shape[:2]) <= _MANY_GROUPS:
-        if shape[2] < min(shape[:2]):
-            found.append(_reading(name, shape))
+        found.append(_reading(name, shape))
         return image
     found.append(f"{name}: the shape {list(shape)} was taken for [H, W, T, 3]; expected [T, H, W, 3]")
     return turn(2, 0, 1, 3)

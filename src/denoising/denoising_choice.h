@@ -13,6 +13,7 @@ struct History;  // denoising/history.h
 struct MixingHistory {
   std::shared_ptr<const History> before;  ///< made of the previous frame; or null
   bool keep_samples = false;              ///< fill EstimatorResult::kept_samples for the next frame
+  bool is_used() const { return before || keep_samples; }
 };
 
 struct DenoisingChoice {

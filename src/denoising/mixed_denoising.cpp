@@ -41,7 +41,7 @@ ModeSettings settings_of(DenoiseMode mode) {
 }
 
 /// Of films; up to 20 groups, their number does not matter for memory.
-constexpr int kUsualGroups = 12;
+constexpr int kTypicalGroups = 12;
 
 /// The denoised layers of a mean.
 std::vector<Image> layers_of(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
@@ -81,12 +81,11 @@ DenoiseMode denoise_mode(const std::string& name) {
 MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<CandidateMaker>& makers, DenoiseMode mode,
                                   bool std_error, std::span<const Layer> layers, const MixingHistory& history) {
   const PartsWeighting chosen = settings_of(mode).weighting;
-  const bool has_history = history.before || history.keep_samples;
   MixedParts mixed = mix_parts(parts, makers, chosen);
   MixedDenoising out{.result = {}, .names = names_of(makers), .candidates = {}, .weights = {}, .shares = {}};
   MethodImage& result = out.result;
-  result = finish(mixed_rows(parts, mixed, makers, std_error || has_history), makers, parts.name);
-  if (has_history) {  // last: the error above is that of the frame alone
+  result = finish(mixed_rows(parts, mixed, makers, std_error || history.is_used()), makers, parts.name);
+  if (history.is_used()) {  // last: the error above is that of the frame alone
     use_history(history, parts, makers, chosen, result.std_error, mixed, result.kept_samples);
     result.estimate = std::move(mixed.mixture.image);
   }
@@ -152,10 +151,6 @@ MixedDenoising denoise_frame(DenoisingParts parts, const std::vector<CandidateMa
   return out;
 }
 
-bool has_history(const MixedDenoisingOptions& options) {
-  return options.history.before || options.history.keep_samples;
-}
-
 /// Tells what is not made elsewhere although options.mix_mean is given.
 void tell_that_made_here(const MixedDenoisingOptions& options, const char* what, MethodImage& result) {
   if (!options.mix_mean) return;
@@ -183,10 +178,10 @@ Run run_of_pair(const Method& base, const MixedDenoisingOptions& options, bool w
       return denoise_frame(std::move(parts), makers, options, settings, {});
     };
     const PartsWeighting weighting = settings_of(options.mode).weighting;
-    if (!options.mix_pair || has_history(options) || weighting.residual_correction) {
+    if (!options.mix_pair || options.history.is_used() || weighting.residual_correction) {
       MixedDenoising out = here();
-      tell_that_made_here(options, has_history(options) ? "frames with a history" : "images of a pair with less bias",
-                          out.result);
+      tell_that_made_here(
+          options, options.history.is_used() ? "frames with a history" : "images of a pair with less bias", out.result);
       return out;
     }
     PairMixture request{&parts, weighting, {}, settings.std_error, stages};
@@ -214,9 +209,9 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
       return denoise_frame(parts_of_mean(independent), makers, options, settings, settings.layers);
     };
     if (!options.mix_mean) return here();
-    if (has_history(options) || !settings.layers.empty() || !can_be_mixed(independent)) {
+    if (options.history.is_used() || !settings.layers.empty() || !can_be_mixed(independent)) {
       MixedDenoising out = here();
-      const char* const what = has_history(options)      ? "frames with a history"
+      const char* const what = options.history.is_used() ? "frames with a history"
                                : settings.layers.empty() ? "images of very few samples"
                                                          : "images with layers";
       tell_that_made_here(options, what, out.result);
@@ -348,7 +343,7 @@ Method with_denoising(const Method& base, const MixedDenoisingOptions& options) 
   method.reliable_samples = base.reliable_samples;
   method.memory = base.memory;
   method.memory.always +=
-      base.is_mean() && !with_oidn ? bytes_of_mixture({.groups = kUsualGroups}) : bytes_of_pair_mixture(with_oidn);
+      base.is_mean() && !with_oidn ? bytes_of_mixture({.groups = kTypicalGroups}) : bytes_of_pair_mixture(with_oidn);
   method.memory.of_halves = method.memory.of_halves_per_group = 0;  // part of that
   if (base.adaptive) {
     method.adaptive = base.adaptive;
