@@ -26,7 +26,7 @@ namespace {
 /// scenes from 16 to 64 samples: docs/notes/denoising.md, docs/methods/iicv.md).
 constexpr double kFallOfMeans = 1, kFallOfPairs = 0.75, kFallOfDenoised = 0.5;
 /// Most of the time, and a render for which it matters.
-constexpr double kMaxTime = 0.5, kLongSeconds = 5;
+constexpr double kMostOfTheTime = 0.5, kLongSeconds = 5;
 
 double fall_of(const RenderOptions& options) {
   if (options.settings.denoising.denoises()) return kFallOfDenoised;
@@ -70,7 +70,8 @@ std::string next_text(const RenderReport& report, const PhaseTimes& times) {
   const RenderResult& result = report.result;
   if (!missing_network(o.settings.denoising).empty() || o.sequence.is_sequence()) return "";  // it is said
   if (result.of_time) return fmt::format("`{}` instead of --time makes the same image", result.of_time->text());
-  const bool is_fixed = times.auxiliary + times.estimate > kMaxTime * times.total() && times.total() > kLongSeconds;
+  const bool is_fixed =
+      times.auxiliary + times.estimate > kMostOfTheTime * times.total() && times.total() > kLongSeconds;
   if (is_fixed && result.predicted && o.request().until <= 0)
     return fmt::format("`--spp {:g}` takes much less than four times as long: most of this time was not for samples",
                        4 * std::round(result.samples_per_pixel()));

@@ -173,6 +173,6 @@ class Group:
 
 def groups_of(spp: int, groups: int, seed: int, kinds: Sequence[str] = PAIR) -> list[Group]:
     """The groups of one picture, each with its own seed: of a PAIR, half of the samples have common random numbers;
-    otherwise all are INDEPENDENT, and bring what features their denoising."""
+    otherwise all are INDEPENDENT, and bring what guides their denoising."""
     return [Group(kind, spp // (len(kinds) * groups), (len(kinds) * seed + number) * groups + group, len(kinds) == 1)
             for number, kind in enumerate(kinds) for group in range(groups)]

@@ -67,7 +67,7 @@ def _images(bpy: Any, scene: Any, groups: list[Group]) -> Iterator[dict[str, Any
 _SCENE = optional(instance("a bpy.types.Scene", lambda value: hasattr(value, "cycles")))
 
 
-@checked(scene=_SCENE, spp=SPP, seed=SEED, groups=whole(3, _covary.most_groups), estimator=text, change=flag,
+@checked(scene=_SCENE, spp=SPP, seed=SEED, groups=whole(3, _covary.max_groups), estimator=text, change=flag,
          progress=PROGRESS)
 def render(scene: Any = None, spp: int = 192, seed: int = 0, *, groups: int = 12, estimator: PairEstimator = DEFAULT,
            change: bool = True, progress: Progress | None = None, **options: Unpack[ImageOptions]) -> BlenderResult:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._arguments import checked, either, flag, instance, optional, path, text, whole
 from ._combine import PROGRESS, check_options, combine, features_of
-from ._covary import most_groups
+from ._covary import max_groups
 from ._options import DEFAULT
 from ._render import SEED, SPP
 from ._result import Result, fields_of
@@ -31,7 +31,7 @@ _LANES_OF_STACK = 1 << 24
 _ROWS_OF_STACK = 4096
 #: Maximum number of specular surfaces that features follow.
 _FOLLOWED_BOUNCES = 8
-_GUIDES = ("Albedo", "N", "DenoisingAlbedo", "DenoisingNormal")
+_FEATURES = ("Albedo", "N", "DenoisingAlbedo", "DenoisingNormal")
 _defined: dict[str, None] = {}
 
 
@@ -166,7 +166,7 @@ def _surface_features(mi: Any, drjit: Any) -> Any:
         mirrors and the glass in front of it (src/integrators/aov.h)."""
 
         def aov_names(self) -> list[str]:
-            return [f"{name}.{c}" for name in _GUIDES for c in "RGB"]
+            return [f"{name}.{c}" for name in _FEATURES for c in "RGB"]
 
         def sample(self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True) -> Any:
             hit = scene.ray_intersect(ray, active)
@@ -273,7 +273,7 @@ _INTEGRATOR = optional(instance("an Integrator of Mitsuba, its name, or a dictio
                                 lambda value: isinstance(value, (str, dict)) or hasattr(value, "render")))
 
 
-@checked(scene=_SCENE, spp=SPP, seed=SEED, integrator=_INTEGRATOR, sensor=whole(0), groups=whole(3, most_groups),
+@checked(scene=_SCENE, spp=SPP, seed=SEED, integrator=_INTEGRATOR, sensor=whole(0), groups=whole(3, max_groups),
          estimator=text, aovs=flag, progress=PROGRESS)
 def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: int = 0, *, groups: int = 12,
            estimator: PairEstimator = DEFAULT, aovs: bool = False, progress: Progress | None = None,
@@ -381,5 +381,5 @@ def _features(mi: Any, scene: Any, camera: Any, seed: int) -> dict[str, FloatArr
     around = _around(mi, camera, {"type": "independent", "sample_count": 16})
     integrator = mi.load_dict({"type": "covary_features"})
     image = integrator.render(scene, around, seed=((2 * seed + 1) * 4096 + 4095) % (1 << 32), spp=16)
-    values = numpy.array(image, dtype=numpy.float32)[..., -3 * len(_GUIDES):]
-    return {name: numpy.ascontiguousarray(values[..., 3 * i:3 * i + 3]) for i, name in enumerate(_GUIDES)}
+    values = numpy.array(image, dtype=numpy.float32)[..., -3 * len(_FEATURES):]
+    return {name: numpy.ascontiguousarray(values[..., 3 * i:3 * i + 3]) for i, name in enumerate(_FEATURES)}

@@ -59,7 +59,7 @@ NB_MODULE(_covary, module) {
   using namespace covary::python;
   module.attr("version") = COVARY_VERSION;
   module.attr("most_samples") = covary::kMaxBudget;  // of a pixel
-  module.attr("most_groups") = covary::Film::kMaxGroups;
+  module.attr("max_groups") = covary::Film::kMaxGroups;
   module.def("set_threads", &set_threads, nanobind::arg("n"));
   bind_errors(module);
   bind_registry(module);

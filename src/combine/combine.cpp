@@ -193,9 +193,9 @@ double planned_memory(const CombineRequest& request) {
 }
 
 void limit_memory(CombineRequest& request, std::optional<double> mebibytes) {
-  constexpr double kMebibyte = 1 << 20, kUsual = 6144 * kMebibyte;
+  constexpr double kMebibyte = 1 << 20, kDefault = 6144 * kMebibyte;
   if (mebibytes) request.max_memory = *mebibytes * kMebibyte;
-  request.memory = request.max_memory.value_or(std::min(kUsual, memory_limit()));
+  request.memory = request.max_memory.value_or(std::min(kDefault, memory_limit()));
 }
 
 Band band_around(const CombineRequest& request, int first, int last) {

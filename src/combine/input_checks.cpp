@@ -142,9 +142,9 @@ void finish(Values& v, long pixels) {
 
 /// Noisy values that are limited to 1 leave pixels in which some are 1; a white background does not.
 bool is_clipped(const Values& v, long pixels) {
-  constexpr long kMin = 500, kMinPartly = 20;  // one in so many, of the pixels and of those that are 1
-  return v.brightest <= 1 && v.clipped * kMin > pixels &&
-         (v.partly_clipped * kMinPartly > v.clipped || v.clipped == pixels);
+  constexpr long kOneIn = 500, kOneInPartly = 20;  // one in so many, of the pixels and of those that are 1
+  return v.brightest <= 1 && v.clipped * kOneIn > pixels &&
+         (v.partly_clipped * kOneInPartly > v.clipped || v.clipped == pixels);
 }
 
 void check_values(const ImageNames& names, long pixels, const Values& v, std::vector<Finding>& findings) {

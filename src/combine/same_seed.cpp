@@ -26,7 +26,7 @@ constexpr float kSame = 1e-3f;
 constexpr long kMinSquares = 100;
 constexpr double kMinPart = 0.25;
 /// The fraction of them that may differ between groups of one seed: rounding sends a few paths elsewhere.
-constexpr double kMaxDiffer = 0.05;
+constexpr double kMaxDifferent = 0.05;
 
 /// D of the square whose corner is (x, y), in group t. Sets `varied` if it is not exactly 0.
 float detail(const GroupedImage& image, int x, int y, int t, bool& varied) {
@@ -44,7 +44,7 @@ struct Likeness {
   bool identical = true;
   bool is_same(long varied) const {
     return squares >= kMinSquares && static_cast<double>(squares) >= kMinPart * static_cast<double>(varied) &&
-           static_cast<double>(differ) <= kMaxDiffer * static_cast<double>(squares);
+           static_cast<double>(differ) <= kMaxDifferent * static_cast<double>(squares);
   }
 };
 

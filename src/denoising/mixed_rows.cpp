@@ -17,9 +17,9 @@ namespace {
 
 /// HeldOutInput::error_over_variance
 double typical_error(const std::vector<CandidateMaker>& makers) {
-  double usual = 0.5;
-  for (const CandidateMaker& maker : makers) usual = std::max(usual, maker.error_over_variance);
-  return usual;
+  double typical = 0.5;
+  for (const CandidateMaker& maker : makers) typical = std::max(typical, maker.error_over_variance);
+  return typical;
 }
 
 ErrorKind kind_of(const std::vector<CandidateMaker>& makers, bool is_mean) {

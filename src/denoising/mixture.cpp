@@ -108,9 +108,9 @@ std::vector<float> weights_everywhere(const MixtureInput& in, int m, const std::
     sums[i] = splat(static_cast<float>(sum));
   }
   std::array<vfloat, kMaxCandidates + 1> x;
-  std::vector<float> usual(kMaxCandidates), weights(kMaxCandidates);
-  std::copy(in.usual.begin(), in.usual.end(), usual.begin());
-  solve_mixture(m, sums.data(), usual.data(), in.typical_count, x.data());
+  std::vector<float> typical(kMaxCandidates), weights(kMaxCandidates);
+  std::copy(in.typical.begin(), in.typical.end(), typical.begin());
+  solve_mixture(m, sums.data(), typical.data(), in.typical_count, x.data());
   for (int p = 0; p < m; ++p) weights[p] = x[p][0];
   return weights;
 }
@@ -151,7 +151,7 @@ Mixture mix(const MixtureInput& input) {
   const int m = static_cast<int>(input.whole->candidates.size());
   const int width = input.guide->width, height = input.guide->height;
   COVARY_CHECK(m >= 1 && m <= kMaxCandidates, "between one and kMaxCandidates candidates");
-  COVARY_CHECK(input.typical_count == 0 || std::ssize(input.usual) == m, "a usual weight for each candidate");
+  COVARY_CHECK(input.typical_count == 0 || std::ssize(input.typical) == m, "a typical weight for each candidate");
   const GuidedCells cells(*input.guide, *input.valid, n_normal_sums(m),
                           [&](int x, int y, float* sums) { add_pixel(input, m, x, y, sums); });
   Mixture mixture;

@@ -53,7 +53,7 @@ struct MixtureInput {
   float bias_share = 1;                               ///< weight of the squared bias, > 0
   float prior = 0;                                    ///< weight of the prior towards the whole image's weights, >= 0
   /// x1: typical weights of the candidates, >= 0, with a sum of at most 1; empty: none are known.
-  std::vector<float> usual;
+  std::vector<float> typical;
   float typical_count = 0;  ///< weight of the prior towards these, >= 0
   /// Weights of each half's squared errors per pixel, one channel, made of the same half; null: 1 / (F'_A^2 + 0.01).
   std::array<const Image*, 2> counts = {};
@@ -65,7 +65,7 @@ struct MixtureInput {
 using NormalRow = std::array<float, n_normal_sums(kMaxCandidates)>;
 /// Those of rows first … end - 1. The input needs no image of all samples.
 std::vector<NormalRow> normal_rows(const MixtureInput& input, int first, int end);
-/// x0 from the sample's rows, with the input's prior towards `usual`; `m`: number of candidates.
+/// x0 from the sample's rows, with the input's prior towards `typical`; `m`: number of candidates.
 std::vector<float> weights_everywhere(const MixtureInput& input, int m, const std::vector<NormalRow>& rows);
 
 /// Rows first … end - 1 of an image.

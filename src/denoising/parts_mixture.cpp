@@ -24,11 +24,11 @@ struct TypicalWeight {
   const char* name;
   float with_network, without;
 };
-constexpr TypicalWeight kUsual[] = {{"oidn", 0.85f, 0},
-                                    {"oidn-wide", 0.05f, 0},
-                                    {"regression", 0, 0.9f},
-                                    {"sharp", 0.05f, 0.1f},
-                                    {"demodulated", 0.05f, 0.1f}};
+constexpr TypicalWeight kTypical[] = {{"oidn", 0.85f, 0},
+                                      {"oidn-wide", 0.05f, 0},
+                                      {"regression", 0, 0.9f},
+                                      {"sharp", 0.05f, 0.1f},
+                                      {"demodulated", 0.05f, 0.1f}};
 /// Those beside a candidate that consists of the others.
 constexpr TypicalWeight kTypicalBesideWeighed[] = {
     {"regression", 0, 0.45f}, {"demodulated", 0, 0.05f}, {kWeighedName, 0, 0.5f}};
@@ -58,14 +58,14 @@ float typical_count_of(double samples) {
 std::vector<float> typical_weights(const std::vector<CandidateMaker>& makers) {
   const bool network = has_network(makers), is_weighed = !makers.empty() && makers.back().shares;
   const std::span<const TypicalWeight> known =
-      is_weighed ? std::span<const TypicalWeight>(kTypicalBesideWeighed) : kUsual;
+      is_weighed ? std::span<const TypicalWeight>(kTypicalBesideWeighed) : kTypical;
   std::vector<float> weights;
   float sum = 0;
   for (const CandidateMaker& maker : makers)
     for (const std::string& name : maker.names) {
-      const auto usual =
+      const auto typical =
           std::find_if(known.begin(), known.end(), [&](const TypicalWeight& u) { return name == u.name; });
-      weights.push_back(usual == known.end() ? 0 : network ? usual->with_network : usual->without);
+      weights.push_back(typical == known.end() ? 0 : network ? typical->with_network : typical->without);
       sum += weights.back();
     }
   if (sum == 0) return {};
@@ -157,8 +157,8 @@ constexpr int kCellsReach = 32;  // of guided_cells.h
 void set_prior(bool is_mean, const std::vector<CandidateMaker>& makers, const PartsWeighting& chosen, double samples,
                MixtureInput& input) {
   input.prior = is_mean ? kPriorOfMean : chosen.prior;
-  if (is_mean) input.usual = typical_weights(makers);
-  if (!input.usual.empty()) input.typical_count = typical_count_of(samples);
+  if (is_mean) input.typical = typical_weights(makers);
+  if (!input.typical.empty()) input.typical_count = typical_count_of(samples);
 }
 
 /// What the weights follow from: both halves.

@@ -23,13 +23,13 @@ constexpr const char* kSamples = "samples";              // attribute covary:sam
 constexpr const char* kVariance = "variance_in_groups";  // channels .R .G .B, in some films
 constexpr const char* kStdError = "StdError";            // layer computed from the groups
 constexpr const char* kShown = "shown";                  // "more": R G B contain more than the groups' samples
-constexpr const char* kMin = "samples_fewest";           // fewest in any pixel; only if pixels differ
-constexpr const char* kMax = "samples_most";
+constexpr const char* kMinSamples = "samples_fewest";    // fewest in any pixel; only if pixels differ
+constexpr const char* kMaxSamples = "samples_most";
 
 /// Attributes computed when writing, which reading does not keep in Film::attributes.
 bool is_derived(const std::string& key) {
-  return key == kFormat || key == kGroups || key == kSamples || key == kMin || key == kMax || key == kFileChecksums ||
-         key == kShown || key == film_key::kPredicted || key == film_key::kPredictedBounds ||
+  return key == kFormat || key == kGroups || key == kSamples || key == kMinSamples || key == kMaxSamples ||
+         key == kFileChecksums || key == kShown || key == film_key::kPredicted || key == film_key::kPredictedBounds ||
          key == film_key::kCleanFeatures;
 }
 
@@ -125,8 +125,8 @@ void write_film(const std::string& path, const Film& film, const Image& std_erro
   derive(kSamples, fmt::to_string(film.mean_count()));
   const auto [fewest, most] = std::minmax_element(film.counts().begin(), film.counts().end());
   if (*fewest < *most) {
-    derive(kMin, fmt::to_string(*fewest));
-    derive(kMax, fmt::to_string(*most));
+    derive(kMinSamples, fmt::to_string(*fewest));
+    derive(kMaxSamples, fmt::to_string(*most));
   }
 
   if (!film.shown.data.empty()) derive(kShown, "more");

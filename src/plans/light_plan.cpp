@@ -19,8 +19,8 @@ namespace {
 /// A single group has no standard error; a film that is added to the image group by group has the camera's number of
 /// groups.
 int with_error(const Plan& plan, int groups) {
-  constexpr int kUsual = 12;
-  return groups == 1 && plan.method->predicts_error && !plan.makes_film() ? kUsual : groups;
+  constexpr int kDefault = 12;
+  return groups == 1 && plan.method->predicts_error && !plan.makes_film() ? kDefault : groups;
 }
 
 }  // namespace
