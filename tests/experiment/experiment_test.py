@@ -470,7 +470,8 @@ class Programs(ExperimentTest):
         copy = next(cell for cell in results["cells"] if cell["method"] == "copy")
         self.assertLess(copy["equal_time"]["value"], 0.1)
         self.assertEqual((copy["seconds"]["processor"]["value"], copy["equal_processor_time"]["value"]), (0, None))
-        self.assertFalse([text for text in results["warnings"] if "processor time" in text])
+        told = [text for text in results["warnings"] if "processor time" in text]
+        self.assertFalse([text for text in told if ", copy," in text], "a busy machine may be told of the others")
 
     def test_mistakes(self):
         self.bad(2, "method 'copy' is made by a program of your own: give --program mine=COMMAND")
