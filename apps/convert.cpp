@@ -14,6 +14,7 @@
 #include "combine/result_file.h"
 #include "commands.h"
 #include "core/error.h"
+#include "core/number_text.h"
 #include "declared_options.h"
 #include "film/exr_copy.h"
 #include "film/image_rows.h"
@@ -222,6 +223,24 @@ bool convert_by_rows(const ConvertOptions& options) {
   return true;
 }
 
+/// One image, or several side by side, to one.
+void convert_one(const ConvertOptions& options) {
+  const std::vector<std::string> inputs(options.files.begin(), options.files.end() - 1);
+  const std::string& output = options.files.back();
+  Outputs outputs;
+  outputs.reads(inputs);
+  outputs.writes_result(kOutput, output, OutputKind::kImage, "convert", options.overwrite);
+  if (inputs.size() == 1 && lower_extension(output) == ".exr" && !options.colours && is_exr_image(inputs[0]))
+    return convert_exr(options);
+  if (convert_by_rows(options)) return;
+  check_memory(options);
+  std::vector<LoadedPicture> pictures;
+  for (const std::string& input : inputs) read_pictures(options, input, pictures);
+  LoadedPicture picture = joined(std::move(pictures));
+  expose(options, picture.colours.image);
+  write_image(output, picture.colours.image, picture.colours.place, attributes_of(options, false), picture.alpha);
+}
+
 bool names_frames(const std::string& path) { return is_frame_pattern(path) && !std::filesystem::exists(path); }
 
 /// Converts numbered images, or several sequences side by side, to a video.
@@ -253,9 +272,9 @@ void convert_to_video(const ConvertOptions& options) {
     video.add(image);
   }
   video.finish();
+  fmt::print(stderr, "{}: {} at {:g} per second\n", output, counted(frames.size(), "frame"),
+             options.rate.value_or(kDefaultRate));
 }
-
-void convert(const ConvertOptions& options);
 
 /// Converts numbered images to numbered images; a file without a number is the same for all.
 void convert_frames(const ConvertOptions& options) {
@@ -272,7 +291,8 @@ void convert_frames(const ConvertOptions& options) {
       if (names_frames(file)) file = frame_name(file, frame);
     for (size_t i = 0; i + 1 < one.files.size(); ++i) inspect_image(one.files[i], options.checksums());
   }
-  for (const ConvertOptions& one : of_frames) convert(one);
+  for (const ConvertOptions& one : of_frames) convert_one(one);
+  fmt::print(stderr, "{}: {}\n", options.files.back(), counted(frames.size(), "frame"));
 }
 
 void convert(const ConvertOptions& options) {
@@ -285,20 +305,10 @@ void convert(const ConvertOptions& options) {
                                                "(.mp4, .mkv, .mov, .webm)",
                                                *frames));
   if (options.rate) throw Error(ErrorCode::kUsage, "--fps is an option of videos (.mp4, .mkv, .mov, .webm)");
-  const std::vector<std::string> inputs(options.files.begin(), options.files.end() - 1);
-  const std::string& output = options.files.back();
-  Outputs outputs;
-  outputs.reads(inputs);
-  outputs.writes_result(kOutput, output, OutputKind::kImage, "convert", options.overwrite);
-  if (inputs.size() == 1 && lower_extension(output) == ".exr" && !options.colours && is_exr_image(inputs[0]))
-    return convert_exr(options);
-  if (convert_by_rows(options)) return;
-  check_memory(options);
-  std::vector<LoadedPicture> pictures;
-  for (const std::string& input : inputs) read_pictures(options, input, pictures);
-  LoadedPicture picture = joined(std::move(pictures));
-  expose(options, picture.colours.image);
-  write_image(output, picture.colours.image, picture.colours.place, attributes_of(options, false), picture.alpha);
+  convert_one(options);
+  if (!std::filesystem::is_regular_file(options.files.back())) return;  // such as /dev/stdout
+  const ImagePlace place = inspect_image(options.files.back()).place;
+  fmt::print(stderr, "{}: {} x {} pixels\n", options.files.back(), place.window.width, place.window.height);
 }
 
 }  // namespace

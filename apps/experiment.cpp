@@ -59,10 +59,10 @@ lab::Suite builtin(const std::string& name) {
   if (found != lab::builtin_suites().end()) return lab::parse_suite(std::string(found->second), name + ".json");
   std::vector<std::string> names = names_of(lab::builtin_suites());
   for (const std::string& paper : names_of(lab::builtin_papers())) names.push_back(paper);
-  throw Error(
-      ErrorCode::kUsage,
-      fmt::format("no suite is named '{}'", name) +
-          hint_and_list(name, names, fmt::format("expected SUITE.json, a scene or one of {}", fmt::join(names, ", "))));
+  const std::string expected = fmt::format("expected SUITE.json, a scene (a file, or {}) or one of {}",
+                                           fmt::join(builtin_scene_names(), ", "), fmt::join(names, ", "));
+  for (const std::string& scene : builtin_scene_names()) names.push_back(scene);
+  throw Error(ErrorCode::kUsage, fmt::format("no suite is named '{}'", name) + hint_and_list(name, names, expected));
 }
 
 /// The suite, not yet changed by the command's options.

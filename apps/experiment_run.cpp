@@ -60,9 +60,10 @@ void show_progress(const lab::Progress& p, const std::string& name, ProgressLine
   line.show([p, name, since = Stopwatch()] {
     const double left = p.seconds_left - since.seconds();
     return fmt::format("[{}/{}{}] {}{}", p.done, p.total,
-                       left > 0             ? ", " + format_duration(left) + " left"
-                       : p.seconds_left > 0 ? ", longer than expected"
-                                            : "",
+                       left > 0               ? ", " + format_duration(left) + " left"
+                       : p.seconds_left > 0   ? ", longer than expected"
+                       : since.seconds() >= 1 ? ", " + format_duration(since.seconds()) + " so far"
+                                              : "",
                        name, p.what);
   });
 }
@@ -132,8 +133,11 @@ void check_methods(const lab::Suite& suite, const lab::Programs& programs) {
       problems.push_back(fmt::format("method '{}': {}", method.name, error.what()));
     }
     if (!method.program.empty() && !programs.contains(method.program))
-      problems.push_back(fmt::format("method '{}' is made by a program of your own: give --{} {}=COMMAND", method.name,
-                                     method.renders ? "program" : "renderer", method.program));
+      problems.push_back(
+          fmt::format("method '{}' is made by a program of your own: give --{} {}=COMMAND (in Python "
+                      "{}={{\"{}\": function}})",
+                      method.name, method.renders ? "program" : "renderer", method.program,
+                      method.renders ? "methods" : "renderers", method.program));
   }
   if (!problems.empty()) throw Error(ErrorCode::kUsage, fmt::format("{}", fmt::join(problems, "\n")));
 }

@@ -237,15 +237,16 @@ class Frames {
   /// The summary; throws Error(kInput) if frames failed, or some are `left` because their files are not complete.
   void finish(const std::vector<int>& left) const {
     if (!o_.quiet)
-      fmt::print(stderr, "{} frames in {:.1f} s{}\n", n_done_, watch_.seconds(),
+      fmt::print(stderr, "{} in {:.1f} s{}\n", counted(n_done_, "frame"), watch_.seconds(),
                  kept_.empty() ? "" : fmt::format("; {} existed already: {}", kept_.size(), text_of(kept_)));
     const size_t n_all = n_done_ + kept_.size() + failed_.size() + left.size();
     std::vector<std::string> problems;
     if (!failed_.empty())
-      problems.push_back(fmt::format("{} of {} frames failed: {}", failed_.size(), n_all, text_of(failed_)));
+      problems.push_back(fmt::format("{} of {} failed: {}", failed_.size(), counted(n_all, "frame"), text_of(failed_)));
     if (!left.empty())
-      problems.push_back(fmt::format("{} of {} frames are incomplete: {}; files of '{}' are missing or unfinished",
-                                     left.size(), n_all, text_of(left), fmt::join(read_patterns(patterns_), "', '")));
+      problems.push_back(fmt::format("{} of {} incomplete: {}; files of '{}' are missing or unfinished", left.size(),
+                                     counted(n_all, "frame"), text_of(left),
+                                     fmt::join(read_patterns(patterns_), "', '")));
     if (!problems.empty()) throw Error(ErrorCode::kInput, fmt::format("{}", fmt::join(problems, "; ")));
   }
 
@@ -314,7 +315,7 @@ void watch_frames(const FrameOptions& o, const FramePatterns& patterns, bool has
   WatchedFrames watched(o, patterns);
   std::optional<Frames> frames;
   if (!o.quiet)
-    fmt::print(stderr, "waiting for frames '{}'; Ctrl-C{} ends\n", patterns.images[0],
+    fmt::print(stderr, "waiting for frames '{}'; Ctrl-C{} ends, and --resume continues\n", patterns.images[0],
                o.idle ? fmt::format(", or {:g} s without a new frame,", *o.idle) : "");
   const auto run_ready = [&](bool in_order) {
     const std::vector<int> ready = watched.next(in_order);

@@ -45,6 +45,16 @@ std::map<std::string, std::string> builtin_scenes() {
   return files;
 }
 
+}  // namespace
+
+std::vector<std::string> builtin_scene_names() {
+  std::vector<std::string> names;
+  for (const auto& [name, path] : builtin_scenes()) names.push_back(name);
+  return names;
+}
+
+namespace {
+
 /// A word that is no file's name, and no scene's, is an error.
 void check_scene_name(const std::string& word) {
   if (fs::exists(word)) return;
@@ -52,8 +62,7 @@ void check_scene_name(const std::string& word) {
   if (const std::string stem = given.stem().string(); given.has_extension() && builtin_scenes().contains(stem))
     throw Error(ErrorCode::kIo, fmt::format("there is no file '{}'; the built-in scene is called '{}'", word, stem));
   if (given.filename() != word || given.has_extension()) return;
-  std::vector<std::string> names;
-  for (const auto& [name, path] : builtin_scenes()) names.push_back(name);
+  const std::vector<std::string> names = builtin_scene_names();
   throw Error(ErrorCode::kIo,
               fmt::format("there is no file '{}', and no built-in scene of that name", word) +
                   hint_and_list(

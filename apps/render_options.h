@@ -36,6 +36,8 @@ std::string program_path();
 /// The file of that name or, if there is none, the small built-in scene of that name in the program's installation or
 /// source tree.
 std::string scene_file(const std::string& word);
+/// Their names.
+std::vector<std::string> builtin_scene_names();
 
 void add_render_options(CLI::App& command, RenderOptions& options);
 

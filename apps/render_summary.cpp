@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
 #include <vector>
 
+#include "core/number_text.h"
 #include "core/shell_text.h"
 #include "film/splat_layer.h"
 #include "method_options.h"
@@ -53,15 +55,32 @@ std::string samples_text(const RenderResult& result) {
   return text;
 }
 
+constexpr double kMostlyBlack = 0.9;
+
+/// The share of values that are black in the samples and, beside its mean, in the picture.
+double black_share(const RenderResult& result) {
+  constexpr double kBlack = 0.01;
+  const std::vector<float>& picture = result.image.estimate.data;
+  const std::vector<float> samples = result.passes[0].film.mean_image().data;
+  const double n_values = static_cast<double>(picture.size());
+  const double mean = std::accumulate(picture.begin(), picture.end(), 0.0) / n_values;
+  size_t n_black = 0;
+  for (size_t i = 0; i < picture.size(); ++i) n_black += samples[i] == 0 && picture[i] <= kBlack * mean;
+  return picture.empty() ? 0 : static_cast<double>(n_black) / n_values;
+}
+
 std::string quality_text(const RenderReport& report) {
   const RenderResult& result = report.result;
   if (!result.predicted) return "unknown, as no error is predicted here";
-  const std::vector<float>& values = result.image.estimate.data;
-  if (!values.empty() && std::ranges::all_of(values, [](float value) { return value == 0; }))
-    return "the picture is black: the camera sees nothing that is lit";
+  const double black = black_share(result);
+  if (black == 1) return "the picture is black: the camera sees nothing that is lit";
   const Quality quality(*result.predicted, result.image.risks, result.predicted_blocks);
   const char* asked = result.until_reached.value_or(false) ? ", as asked by --until" : "";
-  return quality.text + asked + more_samples(report, quality.relmse);
+  return (black < kMostlyBlack ? ""
+                               : fmt::format("{:.0f} % of the picture is black, as if the camera saw next to nothing "
+                                             "that is lit; of the whole, ",
+                                             std::floor(100 * black))) +
+         quality.text + asked + more_samples(report, quality.relmse);
 }
 
 /// What to do for a better picture; empty if there is nothing in particular.
@@ -142,7 +161,7 @@ void print_frame(const RenderReport& report, const std::string& frame) {
 
 void print_frames(const RenderOptions& options, int n_made, int n_frames, const PhaseTimes& times) {
   const std::string& output = options.request().output;
-  const std::string made = n_made == n_frames ? fmt::format("{} frame{}", n_frames, n_frames > 1 ? "s" : "")
+  const std::string made = n_made == n_frames ? counted(static_cast<size_t>(n_frames), "frame")
                                               : fmt::format("{} of {} frames; the others were there", n_made, n_frames);
   fmt::print(stderr, "{}: {}\ntime: {}\n", output, made, text_of(times, estimate_name(options)));
   if (n_frames > 1)

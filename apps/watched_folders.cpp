@@ -14,6 +14,7 @@
 
 #include "batch.h"
 #include "core/error.h"
+#include "core/number_text.h"
 #include "core/printable.h"
 #include "core/stopwatch.h"
 #include "film/outputs.h"
@@ -113,7 +114,7 @@ void for_each_image(
   std::vector<std::string> failed;
   const Stopwatch watch;
   if (!o.quiet)
-    fmt::print(stderr, "waiting for images in '{}'; Ctrl-C{} ends\n", fmt::join(inputs, "', '"),
+    fmt::print(stderr, "waiting for images in '{}'; Ctrl-C{} ends, and --resume continues\n", fmt::join(inputs, "', '"),
                o.idle ? fmt::format(", or {:g} s without a new one,", *o.idle) : "");
   poll(o.idle, [&] {
     const std::vector<std::string> ready = images.next();
@@ -133,16 +134,17 @@ void for_each_image(
     return ready.empty() ? Found::kNothing : Found::kWork;
   });
   if (!o.quiet)
-    fmt::print(stderr, "{} images in {:.1f} s{}\n", n_done, watch.seconds(),
+    fmt::print(stderr, "{} in {:.1f} s{}\n", counted(n_done, "image"), watch.seconds(),
                n_kept > 0 ? fmt::format("; {} existed already", n_kept) : "");
   const std::vector<std::string> left = images.unfinished();
   const size_t n_all = n_done + n_kept + failed.size() + left.size();
   std::vector<std::string> problems;
   if (!failed.empty())
-    problems.push_back(fmt::format("{} of {} images failed: {}", failed.size(), n_all, fmt::join(failed, ", ")));
+    problems.push_back(
+        fmt::format("{} of {} failed: {}", failed.size(), counted(n_all, "image"), fmt::join(failed, ", ")));
   if (!left.empty())
-    problems.push_back(fmt::format("{} of {} images are incomplete: {}; unfinished, or missing in one of '{}'",
-                                   left.size(), n_all, fmt::join(left, ", "), fmt::join(inputs, "', '")));
+    problems.push_back(fmt::format("{} of {} incomplete: {}; unfinished, or missing in one of '{}'", left.size(),
+                                   counted(n_all, "image"), fmt::join(left, ", "), fmt::join(inputs, "', '")));
   if (!problems.empty()) throw Error(ErrorCode::kInput, fmt::format("{}", fmt::join(problems, "; ")));
 }
 

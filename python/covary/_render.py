@@ -34,6 +34,22 @@ _SCALARS = optional(mapping_of(scalar, "a mapping from names to True, False, num
 _CHECKPOINT_SECONDS = 300.0  # as the program
 
 
+#: How Scene.load() and, of a file, render() and render_frames() see the scene.
+VIEW_RULES = {
+    "resolution": optional(several("(width, height), each from 1 to 65536", whole(1, 65536), whole(1, 65536))),
+    "environment": either("a name or a file", path),
+    "background": optional(either("a grey, or (R, G, B), linear numbers", real(0),
+                                  several("", real(0), real(0), real(0)))),
+    "camera": either("a name or a number from 1", text, whole(1)),
+}
+
+
+def view_options(environment: str | PathLike[str], background: object, camera: str | int) -> dict[str, str]:
+    """As options of the program; without those at their defaults."""
+    return option_texts({"environment": None if environment == "auto" else fspath(environment),
+                         "background": background, "camera": None if camera == "" else str(camera)})
+
+
 class Scene:
     """A scene in memory, with its integrator. Made by Scene.load()."""
 
@@ -42,13 +58,8 @@ class Scene:
         self._loaded = _covary.load_scene(path, **loading)
 
     @staticmethod
-    @checked(path=path,
-             resolution=optional(several("(width, height), each from 1 to 65536", whole(1, 65536), whole(1, 65536))),
-             integrator=text, min_depth=optional(whole(0, 1 << 30)), max_depth=optional(whole(-1, 1 << 30)),
-             integrator_options=_SCALARS, defines=_SCALARS, environment=either("a name or a file", path),
-             background=optional(either("a grey, or (R, G, B), linear numbers", real(0),
-                                        several("", real(0), real(0), real(0)))),
-             camera=either("a name or a number from 1", text, whole(1)), ignore_unknown=flag)
+    @checked(path=path, **VIEW_RULES, integrator=text, min_depth=optional(whole(0, 1 << 30)),
+             max_depth=optional(whole(-1, 1 << 30)), integrator_options=_SCALARS, defines=_SCALARS, ignore_unknown=flag)
     def load(path: str | PathLike[str], *, resolution: tuple[int, int] | None = None, integrator: str = "",
              min_depth: int | None = None, max_depth: int | None = None,
              integrator_options: Mapping[str, bool | int | float | str] | None = None,
@@ -70,8 +81,7 @@ class Scene:
         Raises InputError with every problem of the file.
         """
         texts = {name: str(value) for name, value in (defines or {}).items()}
-        view = option_texts({"environment": None if environment == "auto" else fspath(environment),
-                             "background": background, "camera": None if camera == "" else str(camera)})
+        view = view_options(environment, background, camera)
         return Scene(_file_of(fspath(path)), {"defines": texts, "resolution": resolution, "integrator": integrator,
                                     "min_depth": min_depth, "max_depth": max_depth,
                                     "integrator_options": dict(integrator_options or {}), "view": view,
@@ -161,17 +171,21 @@ def _check_scene_arguments(scene: PathOrScene, options: Mapping[str, Any]) -> No
         raise UsageError(f"{', '.join(found)}: not of render(), but of Scene.load(): render(Scene.load({load}), …)")
 
 
-def _loaded(scene: PathOrScene, integrator: str, shown: Phases | None) -> Scene:
-    """The scene with the integrator."""
+def _loaded(scene: PathOrScene, integrator: str, view: dict[str, Any], shown: Phases | None) -> Scene:
+    """The scene with the integrator, seen so."""
     if isinstance(shown, Line):
         shown(0, 0, "loading")
-    chosen = scene if isinstance(scene, Scene) else Scene.load(scene, integrator=integrator)
-    return chosen.with_integrator(integrator)
+    if not isinstance(scene, Scene):
+        return Scene.load(scene, integrator=integrator, **view)
+    if view:
+        load = ", ".join([repr(scene.path), *(f"{name}={value!r}" for name, value in view.items())])
+        raise UsageError(f"{', '.join(view)}: the scene is loaded already; give it to Scene.load({load})")
+    return scene.with_integrator(integrator)
 
 
 _OPTIONS = declared_rules(_covary.render_options())
 FILTER = _OPTIONS["rfilter"]
-#: Options that are keywords as declared, without those that are arguments by another name or belong to Scene.load().
+#: Options that are keywords as declared, without those that are arguments by another name or of Scene.load(), too.
 _DECLARED = {name: rule for name, rule in _OPTIONS.items()
              if name not in ("rfilter", "no_preview", "resolution", "environment", "background", "camera")}
 
@@ -182,6 +196,7 @@ _DECLARED = {name: rule for name, rule in _OPTIONS.items()
          time=optional(real(0, above=True)), seed=SEED,
          denoise=DENOISE, oidn=empty_or(path), device=text, output=optional(path), passes=optional(path), resume=flag,
          overwrite=flag, checkpoint=optional(real(0)), preview=flag,
+         **VIEW_RULES,
          crop=optional(several("(x, y, width, height) in pixels", whole(0, 65535), whole(0, 65535), whole(1, 65536),
                                whole(1, 65536))),
          filter=FILTER,
@@ -194,6 +209,8 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
            denoise: DenoiseMode | None = None, oidn: str | PathLike[str] = "", device: str = "cpu",
            output: str | PathLike[str] | None = None, passes: str | PathLike[str] | None = None, resume: bool = False,
            overwrite: bool = False, checkpoint: float | None = None, preview: bool = False,
+           resolution: tuple[int, int] | None = None, environment: str | PathLike[str] = "auto",
+           background: float | tuple[float, float, float] | None = None, camera: str | int = "",
            crop: tuple[int, int, int, int] | None = None, filter: Filter | None = None,
            split: tuple[float, float] | None = None, films_only: bool = False, live: bool | int = False,
            threads: int = 0, progress: RenderProgress | None = None, **options: Unpack[RenderOptions]) -> RenderResult:
@@ -212,6 +229,7 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     output: EXR file of the result; preview: write a PNG beside it.
     passes: folder to keep the films in; resume: continue existing films; overwrite: replace them;
         checkpoint: seconds between saving unfinished films, by default 300 with `output` or `passes`; 0: never.
+    resolution, environment, background, camera: as for Scene.load(), if the scene is a file.
     crop: x, y, width and height in the frame.
     split: ratio of the samples of the CRN and the independent pass.
     films_only: render the passes only; result.image is then the mean of all samples.
@@ -232,11 +250,14 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
                      "until_relative": until_relative, "estimator": estimator, "denoise": denoise, "device": device,
                      **{name: keywords.get(name) for name in ("exposure", "aov_samples", "aovs")}})
     declared = {name.replace("_", "-"): keywords.pop(name) for name in _DECLARED if name in keywords}
+    view = {name: value for name, value in (("resolution", resolution), ("environment", environment),
+                                            ("background", background), ("camera", camera))
+            if value not in (None, "auto" if name == "environment" else "")}
     texts = text_options(keywords, estimator or DEFAULT)
     _covary.check_output("" if output is None else fspath(output))
     shown = _phases(progress)
     with ended(shown):
-        chosen = _loaded(scene, integrator, shown)
+        chosen = _loaded(scene, integrator, view, shown)
     if checkpoint is None:
         checkpoint = _CHECKPOINT_SECONDS if output is not None or passes is not None else 0
     loading = chosen._loading

@@ -11,13 +11,11 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._arguments import (
-    Rule, check_names, checked, empty_or, flag, instance, optional, path, real, several, text, whole,
-)
+from ._arguments import Rule, check_names, checked, empty_or, flag, instance, optional, path, real, text, whole
 from ._combine import DENOISE, PROGRESS
 from ._options import DEFAULT, option_texts, text_options
 from ._program import failure, run_program
-from ._render import _DECLARED, FILTER, SEED, SPP, render
+from ._render import _DECLARED, FILTER, SEED, SPP, VIEW_RULES, render, view_options
 from .errors import UsageError
 from .progress import Counted, Progress, steps
 from .scenes import _file_of
@@ -72,14 +70,16 @@ def _watch(files: list[Path], since: float, keeps: bool, progress: Counted,
 
 @checked(_OPTIONS, scene=path, output=path, frames=_RULE, spp=optional(SPP), estimator=optional(text),
          integrator=text, camera_path=optional(path), fps=optional(real(0.01)), history=flag,
-         resolution=optional(several("(width, height), each from 1 to 65536", whole(1, 65536), whole(1, 65536))),
+         **VIEW_RULES,
          until=optional(real(0, above=True)), time=optional(real(0, above=True)), seed=SEED, denoise=DENOISE,
          oidn=empty_or(path), filter=FILTER, resume=flag, overwrite=flag, preview=flag,
          threads=whole(0, 4096), progress=PROGRESS)
 def render_frames(scene: str | PathLike[str], output: str | PathLike[str], frames: str | range,
                   spp: int | None = None, estimator: Estimator | None = None, *, integrator: str = "",
                   camera_path: str | PathLike[str] | None = None, fps: float | None = None, history: bool = False,
-                  resolution: tuple[int, int] | None = None, until: float | None = None, time: float | None = None,
+                  resolution: tuple[int, int] | None = None, environment: str | PathLike[str] = "auto",
+                  background: float | tuple[float, float, float] | None = None, camera: str | int = "",
+                  until: float | None = None, time: float | None = None,
                   seed: int = 0, denoise: DenoiseMode | None = None, oidn: str | PathLike[str] = "",
                   filter: Filter | None = None, resume: bool = False, overwrite: bool = False, preview: bool = False,
                   threads: int = 0, progress: Progress | None = None, **options: Unpack[RenderOptions]) -> list[Path]:
@@ -109,7 +109,8 @@ def render_frames(scene: str | PathLike[str], output: str | PathLike[str], frame
         "until": None if until is None else f"relmse={until!r}", "integrator": integrator or None,
         "denoise": denoise, "oidn": fspath(oidn) or None, "resume": resume, "overwrite": overwrite,
         "no-preview": not preview, "resolution": resolution, "camera-path": camera_path, "fps": fps,
-        "history": "on" if history else None, "rfilter": filter, "threads": threads or None, **declared})
+        "history": "on" if history else None, "rfilter": filter, "threads": threads or None,
+        **view_options(environment, background, camera), **declared})
     values.update(text_options(keywords, estimator or DEFAULT))
     arguments = [word for name, value in values.items() for word in ((f"--{name}", value) if value else (f"--{name}",))]
     files = [_frame_path(pattern, frame) for frame in numbers]

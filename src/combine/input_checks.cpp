@@ -9,6 +9,7 @@
 
 #include "combine/grey.h"
 #include "core/error.h"
+#include "core/number_text.h"
 #include "film/groups.h"
 #include "filters/planes.h"
 
@@ -299,9 +300,7 @@ std::string ImageNames::render(size_t group) const {
   return group < renders.size() ? renders[group] : fmt::format("render {}", group + 1);
 }
 
-std::string ImageNames::count(size_t n) const {
-  return fmt::format("{} {}{}", n, renders.empty() ? "group" : "render", n == 1 ? "" : "s");
-}
+std::string ImageNames::count(size_t n) const { return counted(n, renders.empty() ? "group" : "render"); }
 
 InputReport InputChecks::report(const ImageNames& of_crn, const ImageNames& of_independent) const {
   const State& s = *state_;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/number_text.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -37,6 +39,11 @@ std::optional<std::vector<int64_t>> parse_whole_numbers(std::string_view text, c
 
 std::optional<std::vector<double>> parse_reals(std::string_view text, char separator, size_t count) {
   return parse_list<double>(text, separator, count, parse_real);
+}
+
+std::string counted(size_t n, std::string_view noun, std::string_view plural) {
+  if (n == 1) return fmt::format("1 {}", noun);
+  return plural.empty() ? fmt::format("{} {}s", n, noun) : fmt::format("{} {}", n, plural);
 }
 
 }  // namespace covary

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parsing of numbers in options: decimal digits only ("010" is ten, "0x10" is invalid), nothing after them, never NaN.
+// Numbers in texts. Those of options have decimal digits only ("010" is ten, "0x10" is invalid) and nothing after them,
+// and are never NaN.
 #pragma once
 
 #include <charconv>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <system_error>
 #include <vector>
@@ -33,5 +35,8 @@ std::optional<double> parse_real(std::string_view text);
 /// the range of int64_t, so that two of them can be added.
 std::optional<std::vector<int64_t>> parse_whole_numbers(std::string_view text, char separator, size_t count);
 std::optional<std::vector<double>> parse_reals(std::string_view text, char separator, size_t count);
+
+/// "1 image", "3 images"; "2 meshes" with `plural` "meshes".
+std::string counted(size_t n, std::string_view noun, std::string_view plural = "");
 
 }  // namespace covary

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/number_text.h"
 #include "film/groups.h"
 
 namespace covary {
@@ -19,8 +20,8 @@ void check_counts(const char* name, const GroupedImage& image, std::vector<std::
   const uint32_t* few = std::find_if(image.counts, image.counts + n_pixels, [&](uint32_t n) { return n < groups; });
   if (few == image.counts + n_pixels) return;
   const auto pixel = static_cast<int>(few - image.counts);
-  problems.push_back(fmt::format("pixel ({}, {}) of the {} image has {} sample{}, fewer than the {} groups",
-                                 pixel % image.width, pixel / image.width, name, *few, *few == 1 ? "" : "s", groups));
+  problems.push_back(fmt::format("pixel ({}, {}) of the {} image has {}, fewer than the {} groups", pixel % image.width,
+                                 pixel / image.width, name, counted(*few, "sample"), groups));
 }
 
 }  // namespace
@@ -75,11 +76,11 @@ void check_inputs(const GroupedImage& crn, const GroupedImage& independent, int 
         fmt::format("the CRN image is {} x {} and the independent image {} x {}; they must have the same size",
                     crn.width, crn.height, independent.width, independent.height));
   if (crn.groups < min_crn_groups)
-    problems.push_back(fmt::format("the CRN image has {} group{}, at least {} are needed (12 are recommended)",
-                                   crn.groups, crn.groups == 1 ? "" : "s", min_crn_groups));
+    problems.push_back(fmt::format("the CRN image has {}, at least {} are needed (12 are recommended)",
+                                   counted(crn.groups, "group"), min_crn_groups));
   if (independent.groups < min_independent_groups)
-    problems.push_back(fmt::format("the independent image has {} group{}, at least {} are needed with these settings",
-                                   independent.groups, independent.groups == 1 ? "" : "s", min_independent_groups));
+    problems.push_back(fmt::format("the independent image has {}, at least {} are needed with these settings",
+                                   counted(independent.groups, "group"), min_independent_groups));
   if (!problems.empty()) return;
   check_counts("CRN", crn, problems);
   check_counts("independent", independent, problems);

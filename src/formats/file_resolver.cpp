@@ -126,7 +126,8 @@ std::string FileResolver::find(const std::string& name, const SourceLocation& wh
     for_entries(folder, [&](const fs::path& entry) { neighbours.push_back(entry.filename().string()); });
   }
   const std::string hint = did_you_mean(fs::path(portable).filename().string(), neighbours);
-  diagnostics.error(where, fmt::format("file '{}' not found in {}{}", name, searched, hint));
+  diagnostics.error(where, fmt::format("file '{}' not found in {}{}", name, searched, hint),
+                    fmt::format("files not found in {}", searched));
   return "";
 }
 

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/memory_limit.h"
+#include "core/number_text.h"
 #include "core/parallel.h"
 #include "io/object_factory.h"
 #include "io/shapes.h"
@@ -152,8 +153,8 @@ void DegenerateTriangles::see(const Shape& shape, const SourceLocation& where) {
 
 void DegenerateTriangles::tell(Diagnostics& diagnostics) const {
   if (n_ > 0)
-    diagnostics.warn({}, fmt::format("{} triangles of zero area in {} meshes were left out, the first in {}", n_,
-                                     n_meshes_, first_.text()));
+    diagnostics.warn({}, fmt::format("{} of zero area in {} left out, the first in {}", counted(n_, "triangle"),
+                                     counted(n_meshes_, "mesh was", "meshes were"), first_.text()));
 }
 
 size_t n_instances_alike(const ObjectDescription& scene, const ObjectDescription& instance) {

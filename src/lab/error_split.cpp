@@ -141,13 +141,6 @@ Estimate widened(const Estimate& estimate, double standard_error) {
           estimate.value + (estimate.high - estimate.value) * factor};
 }
 
-/// Whether a ratio, known with `dof` degrees of freedom, is not 1: by more than 1e-3, which chance alone would do with
-/// a probability of at most 1e-3.
-bool is_off(const Estimate& ratio, int dof) {
-  const double off = std::abs(ratio.value - 1);
-  return dof >= 1 && off > 1e-3 && off > student_t_quantile(1 - 5e-4, dof) * ratio.standard_error;
-}
-
 /// `error[s]`: error of render s; `around_mean[s]`: <(F_s - F)^2>.
 SplitError split(const std::vector<double>& error, const std::vector<double>& around_mean, double reference_error) {
   SplitError result;
@@ -207,6 +200,12 @@ ErrorSplit split_error(std::span<const Image> renders, std::span<const Image> im
   return result;
 }
 
+bool is_mean_off(const ErrorSplit& split) {
+  const int dof = static_cast<int>(split.relative.of_render.size()) - 1;
+  const double off = std::abs(split.mean_ratio.value - 1);
+  return dof >= 1 && off > 1e-3 && off > student_t_quantile(1 - 5e-4, dof) * split.mean_ratio.standard_error;
+}
+
 std::vector<std::string> suspicions(const ErrorSplit& split, bool unbiased) {
   constexpr double kLean = 5.5;  // two-sided probability 4e-8 for a normal number
   std::vector<std::string> found;
@@ -235,7 +234,7 @@ std::vector<std::string> suspicions(const ErrorSplit& split, bool unbiased) {
         fmt::format("{:.0f} % of the error is the same in all renders, although this method has no bias: is the "
                     "reference of the same scene, with the same settings?",
                     100 * e.squared_bias.value / e.error.value));
-  if (const Estimate& mean = split.mean_ratio; is_off(mean, static_cast<int>(e.of_render.size()) - 1))
+  if (const Estimate& mean = split.mean_ratio; is_mean_off(split))
     found.push_back(fmt::format(
         "the image mean is {:+.2f} % off the reference's (95 %: {:+.2f} % to {:+.2f} %): "
         "something is {}",

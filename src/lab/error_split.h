@@ -54,4 +54,8 @@ ErrorSplit split_error(std::span<const Image> renders, std::span<const Image> re
 /// have no bias (plain path tracing), so a squared bias suggests a reference of another scene.
 std::vector<std::string> suspicions(const ErrorSplit& split, bool unbiased);
 
+/// Whether the image mean is not the reference's: by more than 1e-3, which chance alone would do with a probability of
+/// at most 1e-3; a suspicion.
+bool is_mean_off(const ErrorSplit& split);
+
 }  // namespace covary::lab

@@ -2,6 +2,7 @@
 #include "lab/experiment.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -310,11 +311,31 @@ class Experiment {
     }
   }
 
-  void collect_warnings() {
+  std::string name_of(const Cell& cell) const {
     const Suite& suite = results_.suite;
+    return fmt::format("{}, {}, {}", suite.scenes[cell.scene].name, suite.methods[cell.method].name,
+                       suite.budgets[cell.budget].label());
+  }
+
+  /// Once a method's image mean is off, its other cells need not be as certain: all whose 95 % intervals lie on the
+  /// same side are named with the first.
+  void warn_of_like_means(const Cell& first) {
+    std::vector<std::string> others;
     for (const Cell& cell : results_.cells) {
-      const std::string where = fmt::format("{}, {}, {}: ", suite.scenes[cell.scene].name,
-                                            suite.methods[cell.method].name, suite.budgets[cell.budget].label());
+      const Estimate& mean = cell.split.mean_ratio;
+      if (cell.method != first.method || &cell == &first) continue;
+      if (is_mean_off(cell.split) && &cell < &first) return;  // told with that one
+      if (!is_mean_off(cell.split) && (first.split.mean_ratio.value > 1 ? mean.low > 1 : mean.high < 1))
+        others.push_back(fmt::format("{} ({:+.2f} %)", name_of(cell), 100 * (mean.value - 1)));
+    }
+    if (!others.empty())
+      results_.warnings.push_back(fmt::format("{}: the image means of {} are off, too, although less certainly",
+                                              results_.suite.methods[first.method].name, fmt::join(others, "; ")));
+  }
+
+  void collect_warnings() {
+    for (const Cell& cell : results_.cells) {
+      const std::string where = name_of(cell) + ": ";
       if (cell.split.n_non_finite > 0)
         results_.warnings.push_back(fmt::format(
             "{}{} pixels ({:.2g} % of all) are not finite in a run or reference and left out of its errors, "
@@ -323,6 +344,7 @@ class Experiment {
             100.0 * static_cast<double>(cell.split.n_non_finite) /
                 static_cast<double>(cell.split.n_non_finite + cell.split.n_pixels)));
       for (const std::string& text : cell.suspicions) results_.warnings.push_back(where + text);
+      if (is_mean_off(cell.split)) warn_of_like_means(cell);
       if (std::abs(cell.time_ratio - 1) > 0.1)
         results_.warnings.push_back(fmt::format("{}took {:.3g} s, {:+.0f} % off the budget", where,
                                                 cell.method_seconds.value, 100 * (cell.time_ratio - 1)));

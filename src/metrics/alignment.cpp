@@ -23,9 +23,12 @@ std::string text_of(const CropWindow& w) { return fmt::format("{} x {} at ({}, {
 CropWindow common_window(const std::string& path, const ImagePlace& place, const CropWindow& window,
                          const std::string& other_path, const ImagePlace& other) {
   if (place.frame_width != other.frame_width || place.frame_height != other.frame_height)
-    throw Error(ErrorCode::kInput,
-                fmt::format("{} has a frame of {} x {} pixels, {} one of {} x {}", path, place.frame_width,
-                            place.frame_height, other_path, other.frame_width, other.frame_height));
+    throw Error(
+        ErrorCode::kInput,
+        fmt::format(
+            "{} has a frame of {} x {} pixels, {} one of {} x {}; images of one size are compared: render one again "
+            "with the size of the other (of covary: --resolution)",
+            path, place.frame_width, place.frame_height, other_path, other.frame_width, other.frame_height));
   const CropWindow common = intersection(window, other.window);
   if (common.width < 1 || common.height < 1)
     throw Error(ErrorCode::kInput, fmt::format("{} ({}) and {} ({}) have no pixels in common", path,

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "film/denoised_by.h"
+#include "film/film_file.h"
 #include "film/outputs.h"
 #include "film/pictures.h"
 #include "film/splat_layer.h"
@@ -52,6 +53,14 @@ std::set<std::string> seeds_of(const ImageFacts& image) {
 
 /// Samples per pixel; 0 if the file does not say.
 double samples_of(const ImageFacts& image) { return std::strtod(attribute(image, "samples", "0").c_str(), nullptr); }
+
+/// The predicted relMSE; 0 if the file does not say.
+double predicted_of(const ImageFacts& image) {
+  return std::strtod(attribute(image, film_key::kPredicted, "0").c_str(), nullptr);
+}
+
+/// Of the predicted error of an image, what its reference may have without a word.
+constexpr double kMaxOfItself = 0.2;
 
 /// Of the picture.
 ColourSpace colours_of(const ImageFacts& image) {
@@ -132,6 +141,12 @@ std::vector<std::string> reference_warnings(const ImageFacts& image, const Image
     warnings.push_back(
         fmt::format("{} has {:g} samples per pixel, no more than {} with {:g}: its noise counts as error",
                     reference.name, of_reference, image.name, samples));
+  const double error = predicted_of(image), of_itself = predicted_of(reference);
+  if (warnings.empty() && of_itself > kMaxOfItself * error && error > 0)
+    warnings.push_back(
+        fmt::format("{} has an error of its own, predicted relMSE {:.2g} beside {:.2g} of {}, which is counted as "
+                    "{}'s: render it with more samples, or give two references",
+                    reference.name, of_itself, error, image.name, image.name));
   return warnings;
 }
 

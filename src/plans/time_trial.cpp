@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "combine/combine.h"
+#include "core/number_text.h"
 #include "core/random.h"
 #include "core/stop.h"
 #include "film/film_file.h"
@@ -155,8 +156,7 @@ void PlanRun::plan_time_limit() {
         "pixel, {:.2g} for the image and its files)",
         request_.seconds, passed + plan.seconds, passed,
         costs_.auxiliary > 0 ? fmt::format("{:.2g} for auxiliary images, ", plan.aov_samples * costs_.auxiliary) : "",
-        plan.samples * costs_.sample, plan.samples == 1 ? "1 sample" : fmt::format("{} samples", plan.samples),
-        between + costs_.end));
+        plan.samples * costs_.sample, counted(plan.samples, "sample"), between + costs_.end));
   if (needs_aovs()) aov_samples_ = plan.aov_samples;
   // No more groups are begun than can be filled if the trials were wrong by a factor of two; an error needs groups.
   const uint32_t fewest = request_.until > 0 ? state_.budget : 1;

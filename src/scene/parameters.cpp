@@ -2,6 +2,7 @@
 #include "scene/parameters.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <limits>
@@ -16,7 +17,7 @@ std::string SourceLocation::text() const {
 
 namespace {
 
-constexpr size_t kMaxShown = 100;  // errors in one message
+constexpr size_t kMaxShown = 100, kMaxOfKind = 5;  // errors in one message
 
 }  // namespace
 
@@ -33,8 +34,8 @@ auto place(const SourceLocation& where) { return std::tie(where.file, where.line
 
 }  // namespace
 
-void Diagnostics::error(const SourceLocation& where, const std::string& message) {
-  errors_.push_back({where, message});
+void Diagnostics::error(const SourceLocation& where, const std::string& message, const std::string& kind) {
+  errors_.push_back({where, message, kind});
 }
 
 void Diagnostics::warn(const SourceLocation& where, const std::string& message) {
@@ -80,13 +81,20 @@ void Diagnostics::throw_if_errors() const {
   sorted.erase(
       std::unique(sorted.begin(), sorted.end(), [&](const Entry& a, const Entry& b) { return key(a) == key(b); }),
       sorted.end());
-  std::string text;
-  for (size_t i = 0; i < std::min(sorted.size(), kMaxShown); ++i) {
-    if (!text.empty()) text += '\n';
-    text += located(sorted[i].where, sorted[i].message);
+  std::vector<std::string> lines;
+  std::map<std::string, size_t> of_kind;
+  size_t more = 0;
+  for (const Entry& e : sorted) {
+    if (!e.kind.empty() && ++of_kind[e.kind] > kMaxOfKind) continue;
+    if (lines.size() < kMaxShown)
+      lines.push_back(located(e.where, e.message));
+    else
+      ++more;
   }
-  if (sorted.size() > kMaxShown) text += fmt::format("\n… and {} more errors", sorted.size() - kMaxShown);
-  throw Error(ErrorCode::kInput, text);
+  for (const auto& [kind, n] : of_kind)
+    if (n > kMaxOfKind) lines.push_back(fmt::format("… and {} more {}", n - kMaxOfKind, kind));
+  if (more > 0) lines.push_back(fmt::format("… and {} more errors", more));
+  throw Error(ErrorCode::kInput, fmt::format("{}", fmt::join(lines, "\n")));
 }
 
 // ---- Parameters -----------------------------------------------------------------------------------------------------

@@ -36,7 +36,9 @@ class Diagnostics {
   explicit Diagnostics(bool ignores_unknown = false) : ignores_unknown_(ignores_unknown) {}
   bool ignores_unknown() const { return ignores_unknown_; }
 
-  void error(const SourceLocation& where, const std::string& message);
+  /// Of errors with the same `kind`, a plural such as "files not found in 'a'", the first five are told and the others
+  /// counted.
+  void error(const SourceLocation& where, const std::string& message, const std::string& kind = "");
   /// Something that nothing here knows: `what`, e.g. "parameter 'x' of bsdf 'y'", as an error "unknown WHAT" followed
   /// by `hint`, or as a warning that names the first place and the number of places. `instead` ends the warning.
   void unknown(const SourceLocation& where, const std::string& what, const std::string& hint,
@@ -57,7 +59,7 @@ class Diagnostics {
  private:
   struct Entry {
     SourceLocation where;
-    std::string message;
+    std::string message, kind;
   };
   struct Places {
     SourceLocation first;

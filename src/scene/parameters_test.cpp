@@ -186,6 +186,16 @@ TEST(Diagnostics, SortsAndMergesErrors) {
   EXPECT_EQ(diagnostics.warnings()[0], "a.xml:3:1: odd");
 }
 
+TEST(Diagnostics, CountsManyErrorsOfAKind) {
+  Diagnostics diagnostics;
+  for (int line = 8; line >= 1; --line) diagnostics.error({"a.xml", line, 1}, "no mesh", "meshes not found in 'm'");
+  diagnostics.error({"a.xml", 9, 1}, "another");
+  diagnostics.error({"b.xml", 1, 1}, "no image", "images not found in 'i'");
+  EXPECT_EQ(message_of([&] { diagnostics.throw_if_errors(); }),
+            "a.xml:1:1: no mesh\na.xml:2:1: no mesh\na.xml:3:1: no mesh\na.xml:4:1: no mesh\na.xml:5:1: no mesh\n"
+            "a.xml:9:1: another\nb.xml:1:1: no image\n… and 3 more meshes not found in 'm'");
+}
+
 TEST(SourceLocation, LeavesOutTheLineOfAWholeFile) {
   EXPECT_EQ((SourceLocation{"a.xml", 3, 4}).text(), "a.xml:3:4");
   EXPECT_EQ((SourceLocation{"a.xml"}).text(), "a.xml");

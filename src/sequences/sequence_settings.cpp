@@ -28,7 +28,8 @@ void declare(Settings& s, SequenceSettings& v) {
          {.effect = OptionEffect::kSamples});
   s.on_off("history", v.history,
            "Mix in the previous frame, moved to the current positions, where held-out samples prefer it");
-  s.only_if(v.is_sequence(), {"camera-path", "fps", "history"}, "without `frames`");
+  s.only_if(v.is_sequence(), {"camera-path", "fps", "history"},
+            "without `frames` (one frame, too, e.g. 8, into OUT_####.exr)");
 }
 
 }  // namespace covary

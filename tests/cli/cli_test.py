@@ -328,7 +328,7 @@ class Convert(CliTest):
 
     def test_srgb_and_exposure(self):
         self.image("a.exr", (0.5, 0.25, 7))
-        self.good("convert", "a.exr", "a.png")
+        self.assertEqual(self.good("convert", "a.exr", "a.png").stderr, "a.png: 4 x 3 pixels\n")
         self.assertEqual(self.pixels("a.png"), [[188, 137, 255] * 4] * 3)
         self.good("convert", "a.exr", "b.png", "--exposure", "-1")
         self.assertEqual(self.pixels("b.png"), [[137, 99, 255] * 4] * 3)

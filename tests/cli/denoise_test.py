@@ -213,7 +213,8 @@ class Denoise(RenderTest):
         # The standard error in colours, whose scale is told.
         width, height = map(int, SMALL[1].split("x"))
         told = self.good("convert", "a.exr", "errors.png", "--layer", "StdError", "--false-colours").stderr
-        self.assertRegex(told, r"^errors.png: [\d.e-]+ black, .* pale yellow \(logarithmic\)\n$")
+        self.assertRegex(told, r"^errors.png: [\d.e-]+ black, .* pale yellow \(logarithmic\)\n"
+                               r"errors.png: 64 x 48 pixels\n$")
         self.assertEqual((self.path / "errors.png").read_bytes()[16:24], bytes([0, 0, 0, width, 0, 0, 0, height]))
 
     def test_intervals_of_all_kinds(self):

@@ -102,9 +102,11 @@ class Video(CliTest):
         self.image("logo.exr", [5] * 3)
         for arguments, alone in ((("f_##.exr", "p_####.png"), ("f_10.exr", "alone.png")),
                                  (("f_##.exr", "logo.exr", "q_####.png"), ("f_10.exr", "logo.exr", "alone.png"))):
-            for words in (arguments, alone):
+            width = 4 * (len(alone) - 1)
+            for words, told in ((arguments, f"{arguments[-1]}: 3 frames\n"),
+                                (alone, f"alone.png: {width} x 3 pixels\n")):
                 result = self.convert(*words, "--exposure", "-5", "--overwrite")
-                self.assertEqual((result.returncode, result.stderr), (0, ""))
+                self.assertEqual((result.returncode, result.stderr), (0, told))
             pattern = arguments[-1]
             self.assertEqual(sorted(p.name for p in self.path.glob(pattern.replace("####", "*"))),
                              [pattern.replace("####", f"{n:04}") for n in (1, 2, 10)])

@@ -307,6 +307,14 @@ class Warnings(OutputsTest):
         a, r = self.attributed("a.exr", 1, samples="96"), self.attributed("r.exr", 2, samples="48")
         self.assertEqual(self.warnings(a, "-r", r),
                          ["r.exr has 48 samples per pixel, no more than a.exr with 96: its noise counts as error"])
+        noisy = self.attributed("r.exr", 2, samples="200", predicted_relmse="0.008")
+        a = self.attributed("a.exr", 1, samples="96", predicted_relmse="0.003")
+        self.assertEqual(self.warnings(a, "-r", noisy),
+                         ["r.exr has an error of its own, predicted relMSE 0.008 beside 0.003 of a.exr, which is "
+                          "counted as a.exr's: render it with more samples, or give two references"])
+        good = self.attributed("r.exr", 2, samples="200", predicted_relmse="0.0002")
+        self.assertEqual(self.warnings("a.exr", "-r", good), [])
+        a, r = self.attributed("a.exr", 1, samples="96"), self.attributed("r.exr", 2, samples="48")
         other = self.attributed("r2.exr", 3, samples="48")
         self.assertEqual(self.warnings(a, "-r", r, "--reference2", other), [], "its noise cancels")
         for changes in ({"denoiser": "Open Image Denoise"}, {"estimator": "iicv --denoise balanced"}):

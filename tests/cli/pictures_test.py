@@ -421,7 +421,7 @@ class Watch(PicturesTest):
             self.write("b_2.exr", frames["b", 2])
             said = running.communicate(timeout=60)[1]
         self.assertEqual(running.returncode, 0, said)
-        self.assertTrue(said.startswith("waiting for frames 'a_#.exr'; Ctrl-C ends\n"), said)
+        self.assertTrue(said.startswith("waiting for frames 'a_#.exr'; Ctrl-C ends, and --resume continues\n"), said)
         self.assertRegex(said, r"\nframe 2: o_2.exr, .*\n2 frames in [\d.]+ s\n")
         self.assertTrue((self.path / "o_2.exr").exists())
 

@@ -53,7 +53,7 @@ class LongSequence(CliTest):
         self.assertEqual(result.returncode, 1)
         self.assertIn("note: 'a.####.exr' has no frame 77\n", result.stderr)
         self.assertRegex(result.stderr, r"\n\d+ frames in [\d.]+ s; \d+ existed already: ")
-        self.assertIn("2 of 239 frames are incomplete: 40, 160; files of ", result.stderr)
+        self.assertIn("2 of 239 frames incomplete: 40, 160; files of ", result.stderr)
         good = [n for n in frames if n not in self.BAD]
         self.assertEqual(sorted(p.name for p in self.path.glob("o.*.exr")), [f"o.{n:04d}.exr" for n in good])
         for name, time_of in before.items():
@@ -86,8 +86,9 @@ class SlowFarm(CliTest):
         result = self.run_covary(*DENOISE, "--watch", "--idle", "6")
         farm.join()
         self.assertEqual(result.returncode, 1, result.stderr)
-        self.assertIn("waiting for frames 'a.####.exr'; Ctrl-C, or 6 s without a new frame, ends\n", result.stderr)
-        self.assertIn("covary: 1 of 4 frames are incomplete: 4; files of 'a.####.exr', 'b.####.exr' are missing or "
+        self.assertIn("waiting for frames 'a.####.exr'; Ctrl-C, or 6 s without a new frame, ends, and --resume "
+                      "continues\n", result.stderr)
+        self.assertIn("covary: 1 of 4 frames incomplete: 4; files of 'a.####.exr', 'b.####.exr' are missing or "
                       "unfinished\n", result.stderr)
         self.assertRegex(result.stderr, r"\n3 frames in [\d.]+ s\n")
         for n in (1, 2, 3):
@@ -112,7 +113,7 @@ class UnfinishedFarm(CliTest):
             result = self.run_covary(*DENOISE, "--resume")
             self.assertEqual(result.returncode, 1, result.stderr)
             self.assertIn(more, result.stderr)
-            self.assertIn("covary: 2 of 3 frames are incomplete: 2-3; files of 'a.####.exr', 'b.####.exr' are missing "
+            self.assertIn("covary: 2 of 3 frames incomplete: 2-3; files of 'a.####.exr', 'b.####.exr' are missing "
                           "or unfinished\n", result.stderr)
             self.assertEqual([p.name for p in self.path.glob("o.*")], ["o.0001.exr"])
         for n in (2, 3):
@@ -173,12 +174,13 @@ class WatchedFolder(CliTest):
         result = self.watch()
         thread.join()
         self.assertEqual(result.returncode, 1)
-        self.assertIn("waiting for images in 'a', 'b'; Ctrl-C, or 5 s without a new one, ends\n", result.stderr)
+        self.assertIn("waiting for images in 'a', 'b'; Ctrl-C, or 5 s without a new one, ends, and --resume "
+                      "continues\n", result.stderr)
         self.assertIn("note: a/mine.exr is left out: 'covary denoise' made it\n", result.stderr)
         self.assertRegex(result.stderr, r"warning: bad.exr failed: a/bad.exr: .*\(channels: N Z\)")
         self.assertRegex(result.stderr, r"\nshot 1.exr: out/shot 1.exr, predicted relMSE [\d.]+.* \(unreliable: .*\)\n")
         self.assertRegex(result.stderr, r"\n4 images in [\d.]+ s\n")
-        self.assertIn("covary: 1 of 6 images failed: bad.exr; 1 of 6 images are incomplete: half.exr; unfinished, or "
+        self.assertIn("covary: 1 of 6 images failed: bad.exr; 1 of 6 images incomplete: half.exr; unfinished, or "
                       "missing in one of 'a', 'b'\n", result.stderr)
         done = ["lamp.EXR", "late.exr", "shot 1.exr", "slow.exr"]
         self.assertEqual(self.written(), done)

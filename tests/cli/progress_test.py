@@ -122,6 +122,16 @@ class Summary(CliTest):
         self.assertRegex(self.good(*RENDER, "--spp", "16", "--estimator", "none", "-o", "b.exr").stderr,
                          "(?m)^how good: unknown, as no error is predicted here$")
 
+    def test_a_picture_that_is_mostly_black_is_told(self):
+        """An error in relation to what is bright says nothing of a camera that looks past the scene."""
+        (self.path / "far.xml").write_text(
+            '<scene version="3.0.0"><integrator type="path"/><sensor type="perspective"><film type="hdrfilm">'
+            '<integer name="width" value="40"/><integer name="height" value="30"/></film></sensor>'
+            '<shape type="sphere"><point name="center" x="0" y="0" z="40"/><emitter type="area"/></shape></scene>')
+        said = self.good("render", "far.xml", "--spp", "16", "-o", "a.exr").stderr
+        self.assertRegex(said, r"(?m)^how good: 9\d % of the picture is black, as if the camera saw next to nothing "
+                               r"that is lit; of the whole, (about|at most) ")
+
     def test_the_json_has_every_phase(self):
         self.said("--spp", "16", "-o", "a.exr", "--json", "a.json")
         seconds = json.loads((self.path / "a.json").read_text())["seconds"]

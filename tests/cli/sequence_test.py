@@ -425,7 +425,7 @@ class Denoise(SequenceTest):
                     film(10 * n + seed, 1, (12, 9), value=seed + 1, sampling="independent", complete=complete))
         said = self.denoise("a_#.exr", "b_#.exr", "-o", "d_#.exr", "--resume", "--force")
         self.assertEqual(said.returncode, 1)
-        self.assertIn("1 of 3 frames are incomplete: 2", said.stderr)
+        self.assertIn("1 of 3 frames incomplete: 2", said.stderr)
         self.assertEqual({p.name for p in self.path.glob("d_*.exr")}, {"d_1.exr", "d_3.exr"})
 
     def test_wrong_motion_and_seeds_are_found(self):

@@ -60,15 +60,17 @@ RENDER = {"scene": (*NO_SCENE, ""), "spp": without_none(NO_SPP), "estimator": ("
           "split": (1, "1:1", "half", (1,), (1, 0), (1, -1), ("1", 1)), "films_only": NO_FLAG, "save_training": NO_PATH,
           "load_training": NO_PATH, "live": (0, 70000, 1.5, "yes", None), "threads": (-1, 5000, 1.5, *NO_NUMBERS),
           "progress": NO_FUNCTION}
+VIEW = {"resolution": (3, "36x24", (36,), (0, 24), (36, 24.5), (36, 70000), (36, "24")), "environment": NO_PATH,
+        "background": ("x", (1, 2), (0, -1, 0)), "camera": (0, [1])}
 #: By function and argument. What a value is refused for may also be found by the library.
 BAD = {
     "covary.Scene.load": {
-        "path": (None, *NO_PATH), "resolution": (3, "36x24", (36,), (0, 24), (36, 24.5), (36, 70000), (36, "24")),
+        "path": (None, *NO_PATH), **VIEW,
         "integrator": ("pth", None, *NO_TEXT), "min_depth": (-1, 1.5, "1", True), "max_depth": (-2, 1.5, "1", True),
-        "integrator_options": (*NO_SCALARS, {"a": 1 << 63}), "defines": NO_SCALARS, "environment": NO_PATH,
-        "background": ("x", (1, 2), (0, -1, 0)), "camera": (0, [1]), "ignore_unknown": NO_FLAG},
+        "integrator_options": (*NO_SCALARS, {"a": 1 << 63}), "defines": NO_SCALARS,
+        "ignore_unknown": NO_FLAG},
     "covary.Scene.with_integrator": {"integrator": ("pth", None, *NO_TEXT)},
-    "covary.render": RENDER,
+    "covary.render": {**RENDER, **VIEW},
     "covary.render_progressively": {"scene": (*NO_SCENE, ""), "spp": without_none(NO_SPP), "estimator": NO_TEXT},
     "covary.render_frames": {
         "scene": (*NO_PATH, None), "output": ("a.exr", None, *NO_PATH), "frames": (3, None, range(0), "x", "1-", [1]),
@@ -76,7 +78,7 @@ BAD = {
                                            "aovs", "aov_samples", "layers", "filter", "exposure", "sampling",
                                            "sampler", "groups", "save_training", "load_training", "threads",
                                            "progress")},
-        "resolution": (3, "36x24", (36,), (0, 24)), "camera_path": NO_PATH, "fps": (0, "1", True), "history": NO_FLAG,
+        **VIEW, "camera_path": NO_PATH, "fps": (0, "1", True), "history": NO_FLAG,
         "resume": NO_FLAG, "overwrite": NO_FLAG, "preview": NO_FLAG},
     "covary.set_threads": {"n": (-1, 5000, 1.5, *NO_NUMBERS)},
     "covary.combine": COMBINE,
@@ -262,10 +264,15 @@ class Arguments(PackageTest):
             self.assert_same_bits(images[0], image)
 
     def test_arguments_of_the_scene(self):
-        for scene in (self.scene, ROOM):
-            message = self.message_of(covary.UsageError, covary.render, scene, 8, resolution=(24, 20))
-            self.assertIn("resolution: not of render(), but of Scene.load(): render(Scene.load('", message)
-            self.assertIn("room.xml', resolution=(24, 20)), …)", message)
+        message = self.message_of(covary.UsageError, covary.render, self.scene, 8, resolution=(24, 20), camera=1)
+        self.assertIn("resolution, camera: the scene is loaded already; give it to Scene.load('", message)
+        self.assertIn("room.xml', resolution=(24, 20), camera=1)", message)
+        message = self.message_of(covary.UsageError, covary.render, ROOM, 8, max_depth=3)
+        self.assertIn("max_depth: not of render(), but of Scene.load(): render(Scene.load('", message)
+        seen = covary.render(ROOM, 8, resolution=(24, 20), environment="white", background=(0, 1, 0), camera=1).image
+        loaded = covary.Scene.load(ROOM, resolution=(24, 20), environment="white", background=(0, 1, 0), camera=1)
+        self.assertEqual(seen.shape, (20, 24, 3))
+        self.assert_same_bits(seen, covary.render(loaded, 8).image)
         self.assertIn("resolution: found '24x20' (str); expected (width, height)",
                       self.message_of(TypeError, covary.render, ROOM, 8, resolution="24x20"))
 
@@ -280,9 +287,10 @@ class Arguments(PackageTest):
         other = {"rfilter": "filter", "no_preview": "preview"}
         taken = set(inspect.signature(covary.render).parameters) - {"scene", "options", "films_only", "live", "threads",
                                                                     "progress", "until_p95", "until_relative"}
+        self.assertEqual({other.get(name, name) for name in declared}, taken)
         of_scene = {"resolution", "environment", "background", "camera"}
-        self.assertEqual({other.get(name, name) for name in declared} - of_scene, taken)
-        self.assertLessEqual(of_scene, set(inspect.signature(covary.Scene.load).parameters))
+        for call in (covary.Scene.load, covary.render, covary.render_frames):
+            self.assertLessEqual(of_scene, set(inspect.signature(call).parameters))
         own = inspect.signature(inspect.unwrap(covary.render)).parameters
         for name, parameter in inspect.signature(covary.render).parameters.items():
             self.assertIsNot(parameter.annotation, parameter.empty, name)

@@ -161,6 +161,18 @@ class Experiments(PackageTest):
         told = "room, broken, 16 spp: 192 pixels (25 % of all) are not finite"
         self.assertTrue(any(told in text for text in warnings), warnings)
 
+    def test_means_that_are_off_less_certainly_are_told(self):
+        """What changes from seed to seed at one budget is certain at the other."""
+        def dark(samples):
+            return samples.image * 0 + (0.01 if samples.spp == 16 else 0.03 * samples.seed)
+
+        suite = {**SUITE, "budgets": [{"spp": 16}, {"spp": 32}], "seeds": 4}
+        warnings = [text for text in self.experiment(suite, dark=dark).results["warnings"] if "dark" in text]
+        self.assertTrue(any(text.startswith("room, dark, 16 spp: the image mean is -") for text in warnings), warnings)
+        self.assertFalse(any(text.startswith("room, dark, 32 spp: the image mean") for text in warnings), warnings)
+        told = [text for text in warnings if text.startswith("dark: the image means of room, dark, 32 spp (-")]
+        self.assertEqual(len(told), 1, warnings)
+
     def test_failures(self):
         def wrong(samples):
             raise ValueError("no idea")
@@ -172,6 +184,10 @@ class Experiments(PackageTest):
                                                        flat=lambda samples: numpy.zeros(3)))
         self.assertIn("no suite is named 'quik'; did you mean 'quick'?",
                       self.message_of(covary.UsageError, self.experiment, "quik"))
+        self.assertIn("no suite is named 'roomy'; did you mean 'room'?",
+                      self.message_of(covary.UsageError, self.experiment, "roomy"))
+        self.assertRegex(self.message_of(covary.UsageError, self.experiment, {"scenes": [{"nam": "room"}]}),
+                         r"^suite:1: scenes\[0\]\.nam")
 
 
 if __name__ == "__main__":

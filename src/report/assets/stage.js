@@ -59,21 +59,23 @@ function draw_label(context, pane, label) {
   context.font = `600 ${LABEL_FONT}`;
   const name_width = context.measureText(name).width;
   context.font = LABEL_FONT;
-  let label_width = label ? context.measureText(label).width + 10 : 0;
-  if (name_width + label_width > space) label_width = 0;  // where both do not fit, the name
-  const width = Math.min(name_width + label_width, Math.max(space, 0));
+  const label_width = label ? context.measureText(label).width : 0, gap = label ? 10 : 0;
+  const below = name_width + gap + label_width > space;  // where both do not fit side by side
+  const whole = below ? Math.max(name_width, label_width) : name_width + gap + label_width;
+  const width = Math.min(whole, Math.max(space, 1));
   const left = right ? pane.clip.x + pane.clip.w - width - 26 : pane.clip.x + 8;
   context.fillStyle = "rgb(16 17 20 / 78%)";
   context.beginPath();
-  context.roundRect(left, pane.clip.y + 8, width + 18, 26, 6);
+  context.roundRect(left, pane.clip.y + 8, width + 18, below && label ? 44 : 26, 6);
   context.fill();
   context.textAlign = "left";
   context.textBaseline = "middle";
   context.fillStyle = "#fff";
   context.font = `600 ${LABEL_FONT}`;
-  context.fillText(name, left + 9, pane.clip.y + 21.5, Math.max(width - label_width, 1));
+  context.fillText(name, left + 9, pane.clip.y + 21.5, width);
   context.fillStyle = "#d5d8dd";
   context.font = LABEL_FONT;
-  if (label_width) context.fillText(label, left + 9 + name_width + 10, pane.clip.y + 21.5);
+  if (label && below) context.fillText(label, left + 9, pane.clip.y + 39.5, width);
+  else if (label) context.fillText(label, left + 9 + name_width + gap, pane.clip.y + 21.5);
   context.textBaseline = "alphabetic";
 }
