@@ -271,18 +271,17 @@ def experiment(suite: str | PathLike[str] | dict[str, Any], output: str | PathLi
              for name, method in (some or {}).items() for word in (option, _program_of(name, method))]
     if scenes is not None:
         words += ["--scenes", fspath(scenes)]
-    is_dictionary = isinstance(suite, dict)
     with tempfile.TemporaryDirectory(prefix="covary-suite-") as folder, _served(given):
-        if is_dictionary:
-            file = Path(folder) / "suite.json"
-            file.write_text(json.dumps(suite), encoding="utf-8")
+        made_file = Path(folder) / "suite.json"
+        if isinstance(suite, dict):
+            made_file.write_text(json.dumps(suite), encoding="utf-8")
             words += ["--scenes", os.getcwd()] if scenes is None else []
-            suite = file
+            suite = made_file
         watcher = _watcher(progress)
         with ended(watcher):
             code, _, errors = run_program("experiment", suite, "-o", output, *([] if watcher else ["--quiet"]), *words,
                                           *(options or []), progress=watcher)
     if code:
-        raise failure(code, errors.replace(f"{suite}:", "suite:") if is_dictionary else errors, InputError)
+        raise failure(code, errors.replace(f"{made_file}:", "suite:"), InputError)
     made = Path(output)
     return Experiment(made, json.loads((made / "results.json").read_text(encoding="utf-8")))
