@@ -345,7 +345,8 @@ void run(CombineOptions o) {
   }
   check_passes(o);
   o.target = gpu::Target::open(o.device);
-  FramePatterns patterns{o.independent, {o.features, o.light}, o.output, {o.independent_layer, o.view}};
+  FramePatterns patterns{
+      o.independent, {o.features, o.light}, o.output, {o.independent_layer, o.view}, estimator_of(o).text};
   o.of_frames.quiet = o.quiet;
   patterns.images.insert(patterns.images.end(), o.crn.begin(), o.crn.end());
   are_frames(o.of_frames, patterns) ? combine_frames(o, patterns) : combine_files(o);

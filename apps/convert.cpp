@@ -20,6 +20,7 @@
 #include "film/image_rows.h"
 #include "film/image_writer.h"
 #include "film/outputs.h"
+#include "frame_files.h"
 #include "metrics/error_map.h"
 #include "metrics/provenance.h"
 #include "numbers.h"
@@ -255,6 +256,7 @@ void convert_to_video(const ConvertOptions& options) {
                                                  input));
   const std::vector<int> frames = frames_on_disk(inputs[0]);
   if (frames.empty()) throw Error(ErrorCode::kInput, fmt::format("there are no frames '{}'", inputs[0]));
+  note_gaps(inputs[0], frames);
   Outputs outputs;
   for (const int frame : frames)
     for (const std::string& input : inputs) {
@@ -291,6 +293,7 @@ void convert_frames(const ConvertOptions& options) {
       if (names_frames(file)) file = frame_name(file, frame);
     for (size_t i = 0; i + 1 < one.files.size(); ++i) inspect_image(one.files[i], options.checksums());
   }
+  note_gaps(*pattern, frames);
   for (const ConvertOptions& one : of_frames) convert_one(one);
   fmt::print(stderr, "{}: {}\n", options.files.back(), counted(frames.size(), "frame"));
 }

@@ -64,8 +64,10 @@ struct Options {
   FrameOptions of_frames;
   std::optional<double> memory_mib;
   std::shared_ptr<const History> history;  ///< of the frame being denoised
-
   DenoiseOptions denoiser() const { return {oidn}; }
+  DenoisingChoice mixing() const {
+    return {mode.empty() ? default_denoising(kDefaultEstimator) : mode, oidn, {history}};
+  }
 };
 
 /// --check: prints which library is used.
@@ -121,10 +123,6 @@ std::vector<Task> tasks_of(const Options& o) {
   return tasks;
 }
 
-FeatureLayers features_of(const Options& o, const Task& task, const ColourSpace& colours) {
-  return FeatureLayers({o.inputs, task.picture, colours, o.albedo, o.normal, o.no_features});
-}
-
 std::map<std::string, std::string> new_attributes(const Options& o) {
   std::map<std::string, std::string> attributes = inherited_attributes(o.inputs);
   attributes["covary:version"] = COVARY_VERSION;
@@ -154,7 +152,8 @@ Denoised denoise_by_network(const Options& o, const Task& task, ProgressLine& pr
           "second render of another seed, too");
   const ImageInfo info = inspect_image(input);
   require_memory_of_network(input, info.place.window, o.memory_mib);
-  FeatureLayers features = features_of(o, task, ImageRows(input, task.layer).colours());
+  const ColourSpace colours = ImageRows(input, task.layer).colours();
+  FeatureLayers features({o.inputs, task.picture, colours, o.albedo, o.normal, o.no_features});
   const PlacedImage image = read_image(input, task.layer, ChecksumPolicy::kCheck, std::nullopt);
   warn_of_values(input, image.image);
   if (const std::string by = denoised_by(info.attributes, info.channels, task.layer); !by.empty())
@@ -209,10 +208,10 @@ nlohmann::ordered_json statistics(const Options& o, const CombineRequest& reques
 Denoised denoise_by_mixture(const Options& o, const Task& task, const GroupedFile& file, ProgressLine& progress) {
   CombineRequest request;
   request.independent = source_of(file);
-  const DenoisingChoice choice{o.mode.empty() ? default_denoising(kDefaultEstimator) : o.mode, o.oidn, {o.history}};
+  const DenoisingChoice choice = o.mixing();
   request.estimator = make_default_estimator(false, {}, choice);
   request.settings.std_error = true;
-  const FeatureLayers features = features_of(o, task, file.colours());
+  const FeatureLayers features({o.inputs, task.picture, file.colours(), o.albedo, o.normal, o.no_features});
   request.settings.features = features.view();
   const BeautyLayers layers(o.inputs, task.picture, o.layers, true);
   request.layers = layers.sources();
@@ -313,15 +312,14 @@ std::string run_one(const Options& o) {
   }
   write(o, place, all, progress);
   const std::optional<PredictedError>& error = all[0].predicted;
-  return o.output + (error ? ", " + prediction_text(*error, std::nullopt) : "");
+  return o.output + (o.history ? ", with the frame before" : "") +
+         (error ? ", " + prediction_text(*error, std::nullopt) : "");
 }
 
 void run_sequence(const Options& o, const FramePatterns& patterns) {
   if (!o.json.empty() && o.json != "-" && !is_frame_pattern(o.json))
     throw Error(ErrorCode::kUsage, fmt::format("--json '{}': of frames, expected a name with '#', or -", o.json));
-  FrameOptions of_frames = o.of_frames;
-  of_frames.quiet = o.quiet;
-  for_each_frame(of_frames, patterns, !is_by_network(o), [&](int frame, std::shared_ptr<const History> history) {
+  for_each_frame(o.of_frames, patterns, !is_by_network(o), [&](int frame, std::shared_ptr<const History> history) {
     Options one = o;
     one.output = frame_name(o.output, frame);
     if (is_frame_pattern(o.json)) one.json = frame_name(o.json, frame);
@@ -335,20 +333,22 @@ void run_sequence(const Options& o, const FramePatterns& patterns) {
 void run_folders(const Options& o) {
   if (!o.json.empty() && o.json != "-")
     throw Error(ErrorCode::kUsage, fmt::format("--json '{}': for images of a folder, expected -", o.json));
-  FrameOptions of_frames = o.of_frames;
-  of_frames.quiet = o.quiet;
-  for_each_image(of_frames, o.inputs, o.output, [&](const std::vector<std::string>& paths, const std::string& result) {
-    Options one = o;
-    one.inputs = paths, one.output = result, one.quiet = true;
-    return run_one(one);
-  });
+  for_each_image(o.of_frames, o.inputs, o.output,
+                 [&](const std::vector<std::string>& paths, const std::string& result) {
+                   Options one = o;
+                   one.inputs = paths, one.output = result, one.quiet = true;
+                   return run_one(one);
+                 });
 }
 
-void run(const Options& o) {
+void run(Options o) {
+  o.of_frames.quiet = o.quiet;
   if (o.check) return check(o);
   if (are_folders(o.of_frames, o.inputs, o.output)) return run_folders(o);
-  const FramePatterns patterns{o.inputs, {}, o.output, o.choice};
-  are_frames(o.of_frames, patterns) ? run_sequence(o, patterns) : static_cast<void>(run_one(o));
+  const std::string made_by = is_by_network(o) ? "" : make_default_estimator(false, {}, o.mixing()).text;
+  const FramePatterns patterns{o.inputs, {}, o.output, o.choice, made_by};
+  if (are_frames(o.of_frames, patterns)) return run_sequence(o, patterns);
+  run_one(o);
 }
 
 }  // namespace

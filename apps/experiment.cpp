@@ -85,6 +85,8 @@ lab::Suite load_suite(const ExperimentCommand& command) {
   } else {
     suite = builtin(command.suite);
   }
+  for (lab::SceneEntry& scene : suite.scenes)
+    if (fs::path(scene.file).extension().empty()) scene.file = scene_file(scene.file);  // `room`, too
   return suite;
 }
 

@@ -57,6 +57,7 @@ void show_progress(const lab::Progress& p, const std::string& name, ProgressLine
     fmt::print(stderr, "failed: {}{}\n", name, p.what);
     return;
   }
+  if (p.total == 0) return line.show([p, name] { return name + p.what; });  // before the runs are known
   line.show([p, name, since = Stopwatch()] {
     const double left = p.seconds_left - since.seconds();
     return fmt::format("[{}/{}{}] {}{}", p.done, p.total,

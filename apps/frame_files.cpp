@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <set>
 #include <string_view>
@@ -14,6 +15,7 @@
 #include "batch.h"
 #include "core/error.h"
 #include "core/number_text.h"
+#include "core/printable.h"
 #include "core/stopwatch.h"
 #include "declared_options.h"
 #include "film/film.h"
@@ -184,16 +186,23 @@ std::string text_of(const std::vector<int>& numbers) {
   return fmt::format("{}", fmt::join(runs, ", "));
 }
 
-/// Tells what a user may not expect: gaps between frames, and files that look like frames but are none.
-void note_gaps(const FrameOptions& o, const std::vector<int>& frames, const FramePatterns& patterns) {
-  constexpr size_t kMaxNamed = 3;
-  if (o.quiet || !o.frames.empty()) return;
+}  // namespace
+
+void note_gaps(const std::string& pattern, const std::vector<int>& frames) {
   std::vector<int> missing;
   for (size_t i = 1; i < frames.size(); ++i)
     for (int frame = frames[i - 1] + 1; frame < frames[i]; ++frame) missing.push_back(frame);
   if (!missing.empty() && missing.size() < frames.size())
-    fmt::print(stderr, "note: '{}' has no frame{} {}\n", patterns.images[0], missing.size() == 1 ? "" : "s",
-               text_of(missing));
+    fmt::print(stderr, "note: '{}' has no frame{} {}\n", pattern, missing.size() == 1 ? "" : "s", text_of(missing));
+}
+
+namespace {
+
+/// Tells what a user may not expect: gaps between frames, and files that look like frames but are none.
+void note_unexpected(const FrameOptions& o, const std::vector<int>& frames, const FramePatterns& patterns) {
+  constexpr size_t kMaxNamed = 3;
+  if (o.quiet || !o.frames.empty()) return;
+  note_gaps(patterns.images[0], frames);
   for (const std::string& pattern : patterns.images) {
     std::vector<std::string> others;
     frames_on_disk(pattern, &others);
@@ -219,7 +228,7 @@ class Frames {
   /// `which`: "frame 3 (3 of 8)". Returns false if the frame failed.
   bool add(int frame, const std::string& which) {
     const bool has_before = history_.motion && last_ == frame - 1;
-    if (o_.resume && is_there(frame) && !(has_before && is_outdated(frame))) {
+    if (o_.resume && is_there(frame) && is_whole(frame) && !(has_before && is_outdated(frame))) {
       kept_.push_back(frame);
       last_ = frame;
       return true;
@@ -251,6 +260,25 @@ class Frames {
   }
 
  private:
+  /// Whether the result can be read; if it is empty or a damaged EXR file, it is removed. Throws Error(kInput) if it
+  /// was made with other settings, or is no EXR file.
+  bool is_whole(int frame) const {
+    const std::string path = frame_name(patterns_.output, frame);
+    if (const std::string damage = damage_of(path); !damage.empty()) {
+      if (std::filesystem::file_size(path) > 0 && !is_exr(path)) throw Error(ErrorCode::kInput, damage);
+      fmt::print(stderr, "warning: {}; it is made again\n", printable(damage));
+      std::filesystem::remove(path);
+      return false;
+    }
+    const std::map<std::string, std::string> attributes = inspect_image(path).attributes;
+    const auto found = attributes.find("covary:estimator");
+    if (found == attributes.end() || found->second == patterns_.made_by) return true;
+    throw Error(
+        ErrorCode::kInput,
+        fmt::format("--resume: '{}' was made by '{}', and not by {}; --overwrite instead of --resume replaces it", path,
+                    found->second, patterns_.made_by.empty() ? "the network alone" : "'" + patterns_.made_by + "'"));
+  }
+
   bool is_outdated(int frame) const {
     const std::string why = outdated(patterns_, frame);
     if (!why.empty() && !o_.quiet) fmt::print(stderr, "note: {}; it is made again\n", why);
@@ -338,7 +366,7 @@ void for_each_frame(const FrameOptions& o, const FramePatterns& patterns, bool h
                     const std::function<std::string(int frame, std::shared_ptr<const History> history)>& run) {
   if (o.watch) return watch_frames(o, patterns, has_history, run);
   std::vector<int> numbers = frames_of_all(o, patterns);
-  note_gaps(o, numbers, patterns);
+  note_unexpected(o, numbers, patterns);
   const std::vector<int> left = o.resume ? take_unfinished(numbers, patterns) : std::vector<int>();
   check_frames(numbers, patterns);
   Frames frames(o, patterns, numbers, has_history, run);

@@ -33,12 +33,16 @@ std::vector<int> frames_of(const std::string& frames, const std::string& pattern
 /// The file of a frame; if the path has no '#', or a file has exactly this name, the file of all frames.
 std::string file_of_frame(const std::string& path, int frame);
 
+/// A note on stderr if numbers between the first and last frame of `pattern` are missing.
+void note_gaps(const std::string& pattern, const std::vector<int>& frames);
+
 /// Files of frames, by patterns.
 struct FramePatterns {
   std::vector<std::string> images;  ///< each with its own samples
   std::vector<std::string> others;  ///< that may contain motion, too, or may not be patterns
   std::string output;
   PictureChoice choice;  ///< in the first image
+  std::string made_by;   ///< the attribute "covary:estimator" of results with the same settings, if they have it
 };
 
 /// Whether the first image is a pattern. Throws Error(kUsage) if other images or the output are not, or for options of

@@ -125,6 +125,8 @@ void merge(const MergeOptions& options) {
   merged.attributes[film_key::kVersion] = COVARY_VERSION;
   merged.attributes[film_key::kCommand] = command_line();
   write_film(options.output, merged, mean_of_groups(rows_of(merged, 0, merged.height())).std_error);
+  fmt::print(stderr, "{}: {} x {} pixels, {:g} samples per pixel\n", options.output, merged.width(), merged.height(),
+             merged.mean_count());
 }
 
 }  // namespace

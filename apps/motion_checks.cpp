@@ -3,11 +3,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <optional>
+#include <vector>
 
 #include "combine/grouped_file.h"
 #include "combine/grouped_source.h"
+#include "core/parallel.h"
 #include "estimators/mean.h"
 #include "film/image_file.h"
 
@@ -15,18 +18,36 @@ namespace covary {
 namespace {
 
 /// If the motion does not match, the signs of another convention with which it does; nullopt if there are none.
-std::optional<std::array<float, 2>> better_signs(const Image& before, const Image& now, const MotionLayers& motion,
-                                                 double fit) {
+std::optional<std::array<float, 2>> better_signs(const Image& before, const Image& now, const MotionLayers& motion) {
   constexpr double kClearly = 0.95;
-  std::optional<std::array<float, 2>> best;
-  for (const std::array<float, 2> signs : {std::array{-1.0f, -1.0f}, {1.0f, -1.0f}, {-1.0f, 1.0f}}) {
-    MotionLayers turned = motion;
-    for (size_t i = 0; i < turned.motion.data.size(); ++i)
-      if (i % 3 < 2) turned.motion.data[i] *= signs[i % 3];
-    const double fit_of_turned = misfit(before, now, turned);
-    if (fit_of_turned < kClearly * fit) fit = fit_of_turned / kClearly, best = signs;
-  }
-  return best;
+  constexpr std::array<std::array<float, 2>, 4> kSigns = {{{1, 1}, {-1, -1}, {1, -1}, {-1, 1}}};
+  std::vector<MotionLayers> turned(kSigns.size(), motion);
+  for (size_t s = 0; s < kSigns.size(); ++s)
+    for (size_t i = 0; i < motion.motion.data.size(); ++i)
+      if (i % 3 < 2) turned[s].motion.data[i] *= kSigns[s][i % 3];
+  const std::vector<double> fits = misfits(before, now, turned);
+  const size_t best = std::ranges::min_element(fits) - fits.begin();
+  return fits[best] < kClearly * fits[0] ? std::optional(kSigns[best]) : std::nullopt;
+}
+
+/// The mean over 5 x 5 pixels, so that noise does not decide what fits.
+Image smoothed(const Image& image) {
+  constexpr int kRadius = 2;
+  Image result(image.width, image.height, image.channels);
+  parallel_for(static_cast<size_t>(image.height), [&](size_t row) {
+    const int y = static_cast<int>(row), last_y = std::min(y + kRadius, image.height - 1);
+    for (int x = 0; x < image.width; ++x) {
+      const int first_y = std::max(y - kRadius, 0), first_x = std::max(x - kRadius, 0);
+      const int last_x = std::min(x + kRadius, image.width - 1);
+      for (int c = 0; c < image.channels; ++c) {
+        float sum = 0;
+        for (int v = first_y; v <= last_y; ++v)
+          for (int u = first_x; u <= last_x; ++u) sum += image.pixel(u, v)[c];
+        result.pixel(x, y)[c] = sum / static_cast<float>((last_y - first_y + 1) * (last_x - first_x + 1));
+      }
+    }
+  });
+  return result;
 }
 
 }  // namespace
@@ -36,11 +57,11 @@ void check_motion(const std::string& before, const std::string& now, const std::
   const auto picture = [&](const std::string& path) {
     const GroupedFile file({path}, layer);
     const GroupedSource source = source_of(file);
-    return mean_of_groups(source.all()).estimate;
+    return smoothed(mean_of_groups(source.all()).estimate);
   };
   const Image image_before = picture(before), image_now = picture(now);
-  const double fit = misfit(image_before, image_now, motion);
-  const std::optional<std::array<float, 2>> signs = better_signs(image_before, image_now, motion, fit);
+  const double fit = misfits(image_before, image_now, {&motion, 1})[0];
+  const std::optional<std::array<float, 2>> signs = better_signs(image_before, image_now, motion);
   if (fit <= 1 && !signs) return;
   const std::string instead =
       signs ? fmt::format("; multiplied by {},{} (--motion-scale) it fits better", (*signs)[0], (*signs)[1]) : "";

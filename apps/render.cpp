@@ -33,6 +33,7 @@
 #include "render_options.h"
 #include "render_progress.h"
 #include "render_steps.h"
+#include "settled_files.h"
 #include "stages.h"
 
 namespace covary {
@@ -199,19 +200,31 @@ void warn_of_scene(const RenderOptions& options, const LoadedScene& scene) {
 
 namespace {
 
-/// Whether --resume finds a picture that has the wanted error already; says so.
+/// Whether --resume finds the complete picture, or one that has the wanted error already; says so.
 bool is_there(const RenderOptions& options, const RenderRequest& request) {
   if (!request.resume || !request.passes.empty() || !options.json.empty() || !options.stages.empty()) return false;
   std::error_code ignored;
   const std::filesystem::path films = passes_folder(request);
   if (std::filesystem::exists(films, ignored)) return false;  // of a later render that was interrupted
   const MadeFile file = made_file(request.output);
-  if (!reaches(file, request.attributes.at(film_key::kMadeOf), relmse_goal(request))) return false;
+  const std::string& made_of = request.attributes.at(film_key::kMadeOf);
+  const bool is_same = file.complete && !file.made_of.empty() && differences(file.made_of, made_of).empty();
+  if (!is_same && !reaches(file, made_of, relmse_goal(request))) {
+    const bool is_replaced = file.complete && differences(file.made_of, made_of, true).empty() &&
+                             asks_for_more(request, file) &&
+                             !inspect_image(request.output).attributes.contains("covary:film");
+    if (is_replaced)
+      fmt::print(stderr, "note: the samples of '{}' were not kept (--passes); all are rendered\n", request.output);
+    return false;
+  }
+  if (const std::string damage = damage_of(request.output); !damage.empty()) {
+    fmt::print(stderr, "warning: {}; the picture is rendered again\n", damage);
+    return false;
+  }
+  const std::string error = file.predicted ? fmt::format(", with a predicted relMSE of {:.3g}", *file.predicted) : "";
   if (!options.quiet)
-    fmt::print(stderr,
-               "{}: complete, with a predicted relMSE of {:.3g}; nothing to render (--overwrite instead of "
-               "--resume renders it again)\n",
-               request.output, *file.predicted);
+    fmt::print(stderr, "{}: complete{}; nothing to render (--overwrite instead of --resume renders it again)\n",
+               request.output, error);
   return true;
 }
 

@@ -24,6 +24,7 @@
 #include "plans/pass_files.h"
 #include "sequences/feature_slopes.h"
 #include "sequences/reprojection.h"
+#include "settled_files.h"
 #include "usage_error.h"
 
 namespace covary {
@@ -39,6 +40,8 @@ void check(const RenderOptions& options) {
   const DenoisingChoice& denoising = options.settings.denoising;
   if (options.sequence.history && (!denoising.denoises() || request.splits_layers()))
     usage("--history is for frames with --denoise, and without --layers");
+  if (options.sequence.history && options.sequence.frames->step != 1)
+    usage("--history has no effect with a step in --frames: it is that of the frame just before");
   for (const auto& [name, path] :
        {std::pair{"-o", request.output}, {"--passes", request.passes}, {"--json", options.json}})
     if (!path.empty() && !is_frame_pattern(path))
@@ -93,16 +96,6 @@ bool is_complete(const std::string& path, const std::string& made_of, double unt
 void remove_empty(const std::string& path) {
   std::error_code ignored;
   if (fs::is_regular_file(path, ignored) && fs::file_size(path, ignored) == 0 && !ignored) fs::remove(path, ignored);
-}
-
-/// What the checksums of a complete frame tell; empty if all is well.
-std::string damage_of(const std::string& path) {
-  try {
-    check_image(path);
-    return "";
-  } catch (const Error& error) {
-    return error.what();
-  }
 }
 
 constexpr double kRateInSeconds = 24;  // of formats whose animations are in seconds

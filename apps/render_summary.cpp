@@ -101,6 +101,11 @@ std::string next_text(const RenderReport& report, const PhaseTimes& times) {
   return fmt::format("`--until relmse={:.1g}` renders until half of it is left", result.predicted->relmse / 4);
 }
 
+void print_training(const RenderResult& result) {
+  if (const IntegratorReport of = result.integrator->report(); !of.summary.empty())
+    fmt::print(stderr, "{} in {:.2f} s\n", of.summary, result.seconds.train);
+}
+
 /// Behind --verbose: speeds, integrator, estimator, and the predicted error with its interval.
 void print_details(const RenderReport& report) {
   const auto& [options, scene, result, load_seconds, threads, last_phase] = report;
@@ -109,10 +114,7 @@ void print_details(const RenderReport& report) {
              scene.scene->build_seconds(), result.render_seconds(),
              format_count(result.camera_sum([](const Pass& p) { return p.result.n_samples; }) / seconds),
              format_count(result.sum([](const Pass& p) { return p.result.n_rays; }) / seconds));
-  if (!result.trials.empty())
-    fmt::print(stderr, "integrator {} (variance x rays)\n", text_of(result.chosen, result.trials));
-  if (const IntegratorReport of = result.integrator->report(); !of.summary.empty())
-    fmt::print(stderr, "{} in {:.2f} s\n", of.summary, result.seconds.train);
+  if (result.trials.empty()) print_training(result);
   const Method estimator = estimator_of(options);
   if (!estimator.is_mean())
     fmt::print(stderr, "{}{} in {:.2f} s\n", estimator.text,
@@ -143,6 +145,10 @@ void print_summary(const RenderReport& report) {
   const RenderRequest& request = options.request();
   const PhaseTimes times = phase_times(report);
   if (options.verbose) print_details(report);
+  if (!result.trials.empty()) {  // what became of the samples that are missing
+    fmt::print(stderr, "integrator {} (variance x rays)\n", text_of(result.chosen, result.trials));
+    print_training(result);
+  }
   print_warnings(report);
   fmt::print(stderr, "{}: {} x {} pixels, {}{}\n", request.output, result.passes[0].film.width(),
              result.passes[0].film.height(), samples_text(result),

@@ -3,12 +3,23 @@
 
 #include <system_error>
 
+#include "core/error.h"
+#include "film/image_file.h"
 #include "imageio/exr_image.h"
 #include "plans/made_of.h"
 
 namespace covary {
 
 bool is_finished_exr(const std::string& path) { return is_complete_exr(path) && made_file(path).complete; }
+
+std::string damage_of(const std::string& path) {
+  try {
+    check_image(path);
+    return "";
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
 
 bool SettledFiles::is_settled(const std::string& path) {
   std::error_code no_size, no_time;

@@ -34,13 +34,13 @@ _LAYERS = optional(mapping_of(IMAGE, "a mapping from names to arrays"))
 
 @checked(crn=IMAGE, independent=IMAGE, estimator=text, light=IMAGE, counts=array,
          samples=optional(whole(1, _covary.most_samples)), denoise=DENOISE, albedo=array, normal=array,
-         denoising_albedo=array, denoising_normal=array, position=array, layers=_LAYERS, oidn=OIDN, device=text,
-         std_error=optional(flag), force=flag, progress=PROGRESS)
+         denoising_albedo=array, denoising_normal=array, position=array, clean_features=flag, layers=_LAYERS,
+         oidn=OIDN, device=text, std_error=optional(flag), force=flag, progress=PROGRESS)
 def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, light: Film | None = None,
             counts: Any = None, samples: int | None = None, denoise: DenoiseMode | None = None, albedo: Any = None,
             normal: Any = None, denoising_albedo: Any = None, denoising_normal: Any = None, position: Any = None,
-            layers: Mapping[str, Any] | None = None, oidn: str | PathLike[str] = "", device: str = "cpu",
-            std_error: bool | None = None, force: bool = False, progress: Progress | None = None,
+            clean_features: bool = False, layers: Mapping[str, Any] | None = None, oidn: str | PathLike[str] = "",
+            device: str = "cpu", std_error: bool | None = None, force: bool = False, progress: Progress | None = None,
             **options: Unpack[EstimatorOptions]) -> Result:
     """Combines `crn`, whose pixels share their random numbers, and `independent`, whose pixels do not, into one image.
 
@@ -61,7 +61,8 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, l
     denoise: for the least error ("auto", "error"), for little bias ("bias"), balanced, or "none"; by default "auto",
         or "none" if another estimator is named. albedo, normal, position: features [H, W, 3], the others only with the
         albedo; denoising_albedo, denoising_normal: features seen through mirrors and glass (from render():
-        aovs["Albedo"], "N", "P", "DenoisingAlbedo", "DenoisingNormal"); oidn: Open Image Denoise's library or its
+        aovs["Albedo"], "N", "P", "DenoisingAlbedo", "DenoisingNormal"); clean_features: they are nearly noise-free, as
+        those of render() are, whose image `films` then give again; oidn: Open Image Denoise's library or its
         folder, by default searched for; "off": not used.
     layers: parts of `independent` by name, such as direct light, in the same groups: denoised with it, they are in the
         result's aovs, and add up to its image with "Rest".
@@ -86,7 +87,8 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, l
     texts = text_options(options, estimator)
     try:
         made = _covary.combine(crn, independent, None if counts is None else _counts(counts), light, albedo, normal,
-                               denoising_albedo, denoising_normal, position, dict(layers or {}), estimator, texts,
+                               denoising_albedo, denoising_normal, position, clean_features, dict(layers or {}),
+                               estimator, texts,
                                denoise or "", fspath(oidn), device, force, std_error, samples,
                                steps(progress, "combining", shown=False))
     except InputError as error:

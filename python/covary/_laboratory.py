@@ -185,7 +185,12 @@ def _make(method: Callable[[Samples], Any], run: dict[str, str]) -> None:
                       int(run["COVARY_SEED"]), int(run["COVARY_SPP"]) if "COVARY_SPP" in run else None,
                       float(run["COVARY_SECONDS"]) if "COVARY_SECONDS" in run else None,
                       (int(run["COVARY_WIDTH"]), int(run["COVARY_HEIGHT"])), (x, y, width, height))
-    image = numpy.ascontiguousarray(method(samples), numpy.float32)
+    made = method(samples)
+    if made is None:
+        raise TypeError("the function returned None; expected an image, [H, W, 3]")
+    image = numpy.ascontiguousarray(made, numpy.float32)
+    if image.shape != (height, width, 3):
+        raise ValueError(f"the function returned the shape {list(image.shape)}; expected [{height}, {width}, 3]")
     _covary.write_image(run["COVARY_OUTPUT"], image, {})
 
 

@@ -212,5 +212,10 @@ class RenderResult(Result):
 
     def _attributes(self) -> dict[str, str]:
         of_film = next(iter(self.films.values())).attributes if self.films else {}
-        known = {name: of_film[name] for name in ("seed", "scene_hash", "settings", "version") if name in of_film}
+        known: dict[str, str] = {name: of_film[name] for name in ("seed", "scene_hash", "settings", "version")
+                                 if name in of_film}
+        if "Albedo" in self.aovs:
+            known["clean_features"] = "true"
+        if self.network:
+            known["denoiser"] = self.network
         return known | super()._attributes()

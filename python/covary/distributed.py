@@ -313,7 +313,8 @@ def _result(canvas: _Canvas, plan: _Plan, n_kept: int, seconds: float) -> Cluste
         made = RenderResult(**_covary.image_of_films(values, {}, films, canvas.aovs))
     else:
         made = combine(films["crn"], films["independent"], plan.estimator,  # type: ignore[arg-type]
-                       **{"force": True, **features_of(canvas.aovs), **plan.options})
+                       **{"force": True, **features_of(canvas.aovs), "clean_features": "Albedo" in canvas.aovs,
+                          **plan.options})
     given = fields_of(made) | {"warnings": list(canvas.warnings), "samples_per_pixel": samples,
                                "not_finite_samples": canvas.not_finite_samples,
                                "negative_samples": canvas.negative_samples, "bad_samples": canvas.bad_samples}

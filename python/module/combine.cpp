@@ -158,6 +158,7 @@ struct CombineArguments {
 struct ExtraInputs {
   nb::object counts, light, albedo, normal, denoising_albedo, denoising_normal, position;
   nb::dict layers;
+  bool clean_features = false;
 };
 
 std::vector<std::string> texts_of(const std::vector<Finding>& findings) {
@@ -176,7 +177,8 @@ DenoisingChoice denoising_of(const std::string& estimator, const std::string& mo
 /// The features of --denoise.
 struct FeatureImages {
   Image albedo, normal, denoising_albedo, denoising_normal, position;
-  FeatureImages(const ExtraInputs& beside, const Method& estimator, const Input& image) {
+  bool clean;
+  FeatureImages(const ExtraInputs& beside, const Method& estimator, const Input& image) : clean(beside.clean_features) {
     const std::string shape = fmt::format("{}, {}, 3", image.height(), image.width());
     const auto take = [&](nb::handle array, const char* name, Image& to) {
       if (array.is_none()) return;
@@ -199,10 +201,13 @@ struct FeatureImages {
     needs(position, albedo, "position", "the albedo");
     needs(denoising_normal, denoising_albedo, "denoising_normal", "denoising_albedo");
     if (!normal.data.empty()) needs(denoising_albedo, denoising_normal, "denoising_albedo", "denoising_normal");
+    if (clean && albedo.data.empty() && denoising_albedo.data.empty())
+      throw Error(ErrorCode::kUsage, "clean_features: it has an effect only together with the albedo");
   }
   Features view() const {
     const auto or_null = [](const Image& image) { return image.data.empty() ? nullptr : &image; };
-    return {or_null(albedo), or_null(normal), or_null(denoising_albedo), or_null(denoising_normal), or_null(position)};
+    return {or_null(albedo),           or_null(normal),   or_null(denoising_albedo),
+            or_null(denoising_normal), or_null(position), clean};
   }
 };
 
@@ -332,20 +337,22 @@ void bind_combine(nb::module_& module) {
       "combine",
       [](nb::object crn, nb::object independent, nb::object counts, nb::object light, nb::object albedo,
          nb::object normal, nb::object denoising_albedo, nb::object denoising_normal, nb::object position,
-         nb::dict layers, const std::string& estimator, const OptionValues& options, const std::string& denoise,
-         const std::string& oidn, const std::string& device, bool force, std::optional<bool> std_error,
-         std::optional<int> samples, nb::object progress) {
-        return combine(crn, independent,
-                       {counts, light, albedo, normal, denoising_albedo, denoising_normal, position, layers},
-                       {estimator, options, denoise, oidn, device, force, std_error, samples}, progress);
+         bool clean_features, nb::dict layers, const std::string& estimator, const OptionValues& options,
+         const std::string& denoise, const std::string& oidn, const std::string& device, bool force,
+         std::optional<bool> std_error, std::optional<int> samples, nb::object progress) {
+        return combine(
+            crn, independent,
+            {counts, light, albedo, normal, denoising_albedo, denoising_normal, position, layers, clean_features},
+            {estimator, options, denoise, oidn, device, force, std_error, samples}, progress);
       },
       "crn"_a.none(), "independent"_a.none(), "counts"_a.none(), "light"_a.none(), "albedo"_a.none(), "normal"_a.none(),
-      "denoising_albedo"_a.none(), "denoising_normal"_a.none(), "position"_a.none(), "layers"_a, "estimator"_a,
-      "options"_a, "denoise"_a, "oidn"_a, "device"_a, "force"_a, "std_error"_a.none(), "samples"_a.none(),
-      "progress"_a.none(),
+      "denoising_albedo"_a.none(), "denoising_normal"_a.none(), "position"_a.none(), "clean_features"_a, "layers"_a,
+      "estimator"_a, "options"_a, "denoise"_a, "oidn"_a, "device"_a, "force"_a, "std_error"_a.none(),
+      "samples"_a.none(), "progress"_a.none(),
       nb::sig("def combine(crn: object, independent: object, counts: object | None, light: object | None, albedo: "
               "object | None, normal: object | None, denoising_albedo: object | None, denoising_normal: object | None, "
-              "position: object | None, layers: dict[str, typing.Any], estimator: str, options: dict[str, str], "
+              "position: object | None, clean_features: bool, layers: dict[str, typing.Any], estimator: str, options: "
+              "dict[str, str], "
               "denoise: str, oidn: str, device: str, force: "
               "bool, std_error: bool | None, samples: int | None, progress: typing.Any) -> dict[str, typing.Any]"));
   module.def(

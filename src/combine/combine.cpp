@@ -316,6 +316,8 @@ EstimatorResult finish(MethodImage image, const GroupedImage* light) {
 }
 
 CombinedImage combine(const CombineRequest& given) {
+  if (given.estimator.name.empty())
+    throw Error(ErrorCode::kUsage, "no `estimator`; make_default_estimator() and make_estimator() make one");
   CombinedImage combined;
   combined.planned_memory = planned_memory(given);
   check_memory(given, combined.planned_memory);

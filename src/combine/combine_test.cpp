@@ -48,6 +48,10 @@ TEST(Combine, PredictsTheErrorOfTheMeanInBands) {
   for (const int rows : {7, kHeight, 2 * kHeight}) EXPECT_NEAR(predicted_relmse_of_mean(source, rows), whole, 1e-12);
 }
 
+TEST(Combine, NeedsAnEstimator) {
+  EXPECT_TRUE(contains(message_of([] { combine({}); }, ErrorCode::kUsage), "no `estimator`"));
+}
+
 TEST(Combine, IsEstimateErrorAndPrediction) {
   const Images images;
   const CombineRequest request = images.request();

@@ -13,15 +13,17 @@ namespace covary {
 namespace {
 
 /// Every group needs samples to have a mean.
-void check_counts(const char* name, const GroupedImage& image, std::vector<std::string>& problems) {
+void check_counts(const std::string& name, const GroupedImage& image, std::vector<std::string>& problems) {
   if (!image.counts) return;
   const size_t n_pixels = static_cast<size_t>(image.width) * image.height;
   const auto groups = static_cast<uint32_t>(image.groups);
   const uint32_t* few = std::find_if(image.counts, image.counts + n_pixels, [&](uint32_t n) { return n < groups; });
   if (few == image.counts + n_pixels) return;
   const auto pixel = static_cast<int>(few - image.counts);
-  problems.push_back(fmt::format("pixel ({}, {}) of the {} image has {}, fewer than the {} groups", pixel % image.width,
-                                 pixel / image.width, name, counted(*few, "sample"), groups));
+  problems.push_back(
+      fmt::format("pixel ({}, {}) of the {} has {}, fewer than the {} groups; render it with fewer "
+                  "groups (`groups`), or more samples",
+                  pixel % image.width, pixel / image.width, name, counted(*few, "sample"), groups));
 }
 
 }  // namespace
@@ -82,8 +84,9 @@ void check_inputs(const GroupedImage& crn, const GroupedImage& independent, int 
     problems.push_back(fmt::format("the independent image has {}, at least {} are needed with these settings",
                                    counted(independent.groups, "group"), min_independent_groups));
   if (!problems.empty()) return;
-  check_counts("CRN", crn, problems);
-  check_counts("independent", independent, problems);
+  if (crn.data == independent.data) return check_counts("image", independent, problems);
+  check_counts("CRN image", crn, problems);
+  check_counts("independent image", independent, problems);
 }
 
 }  // namespace covary

@@ -153,8 +153,8 @@ void DegenerateTriangles::see(const Shape& shape, const SourceLocation& where) {
 
 void DegenerateTriangles::tell(Diagnostics& diagnostics) const {
   if (n_ > 0)
-    diagnostics.warn({}, fmt::format("{} of zero area in {} left out, the first in {}", counted(n_, "triangle"),
-                                     counted(n_meshes_, "mesh was", "meshes were"), first_.text()));
+    diagnostics.warn({}, fmt::format("left out {} of zero area in {}, the first in {}", counted(n_, "triangle"),
+                                     counted(n_meshes_, "mesh", "meshes"), first_.text()));
 }
 
 size_t n_instances_alike(const ObjectDescription& scene, const ObjectDescription& instance) {

@@ -197,6 +197,8 @@ ErrorSplit split_error(std::span<const Image> renders, std::span<const Image> im
   result.reference_error = own.own_error / (3 * n);
   result.reference_noise = reference_error(kRelative);
   result.reference_lean = own.lean.z();
+  const auto is_first = [&](const Image& image) { return image.data == renders[0].data; };
+  result.same_renders = renders.size() > 1 && std::ranges::all_of(renders, is_first);
   return result;
 }
 
@@ -214,6 +216,8 @@ std::vector<std::string> suspicions(const ErrorSplit& split, bool unbiased) {
     found.push_back("both references are the same image, so errors include the reference's noise");
     return found;
   }
+  if (split.same_renders && split.reference_error > 0)  // where there is noise
+    found.push_back("the images of all seeds are the same: is the seed used? (a program's COVARY_SEED)");
   const auto half = [](double z) { return z > 0 ? "first" : "second"; };
   for (size_t s = 0; s < split.reference_lean_of_render.size(); ++s)
     if (const double z = split.reference_lean_of_render[s]; std::abs(z) > kLean)

@@ -34,6 +34,7 @@ struct ErrorSplit {
   SplitError relative, absolute;            ///< relMSE and MSE
   Estimate mean_ratio;                      ///< mean of the renders over mean of the references
   std::vector<double> mean_ratio_of_render;
+  bool same_renders = false;  ///< several, all with the same values
   /// relMSE of R itself: <(R1 - R2)^2 / 4>; far smaller errors cannot be resolved.
   double reference_error = 0;
   double reference_noise = 0;  ///< standard error of the relMSE by the noise of two references

@@ -221,6 +221,7 @@ std::string factor_text(double value) {
 /// "At equal samples (192 spp) balanced has the lowest error: 8.1 times lower than pt (7.0 to 9.4). Not clearly worse:
 /// error." Empty if nothing is significantly better than the baseline.
 std::string verdict(const Results& results, size_t budget, const std::string& condition, Estimate Summary::*ratio) {
+  constexpr double kClearly = 1.2;  // without an interval
   const Suite& suite = results.suite;
   const Summary* best = nullptr;
   const std::vector<const Summary*> all = comparable(results, budget);
@@ -233,35 +234,53 @@ std::string verdict(const Results& results, size_t budget, const std::string& co
   if (!(gain.value > 1))
     return fmt::format("{} no method has less error than '{}'; next is '{}', with {:.2g} times as much.", condition,
                        suite.baseline, suite.methods[best->method].name, 1 / gain.value);
-  const std::string range = fmt::format("({} to {})", factor_text(gain.low), factor_text(gain.high));
-  if (gain.low <= 1)
+  const bool is_known = std::isfinite(gain.low);
+  const std::string range = is_known ? fmt::format("({} to {})", factor_text(gain.low), factor_text(gain.high))
+                                     : "(no interval is known from one seed)";
+  if (gain.low <= 1 || (!is_known && gain.value < kClearly))
     return fmt::format(
         "{} no method has clearly less error than '{}': that of '{}' is {} times lower {}, which these "
         "seeds and scenes do not tell from 1.",
         condition, suite.baseline, suite.methods[best->method].name, factor_text(gain.value), range);
   std::string text = fmt::format("{} '{}' has the lowest error: {} times lower than '{}'", condition,
                                  suite.methods[best->method].name, factor_text(gain.value), suite.baseline);
-  if (!std::isfinite(gain.low)) return text + ".";
   text += fmt::format(" {}.", range);
+  if (!is_known) return text;
   std::vector<std::string> as_good;
   for (const Summary* s : all)
     if (s != best && (s->*ratio).high >= gain.low) as_good.push_back(suite.methods[s->method].name);
   return as_good.empty() ? text : text + fmt::format(" Not clearly worse: '{}'.", fmt::join(as_good, "', '"));
 }
 
+/// The standard error of the difference of two methods' FLIP, over scenes; NaN with a single seed.
+double flip_noise(const Results& results, size_t budget, const Summary& a, const Summary& b) {
+  double squares = 0;
+  size_t n_cells = 0;
+  for (const Cell& cell : results.cells)
+    if (cell.budget == budget && (cell.method == a.method || cell.method == b.method))
+      squares += cell.flip.standard_error * cell.flip.standard_error, ++n_cells;
+  return std::sqrt(squares) / (0.5 * static_cast<double>(n_cells));
+}
+
 std::string flip_verdict(const Results& results, size_t budget) {
+  constexpr double kSeen = 0.02, kClearly = 2;  // of FLIP itself; standard errors
   const Suite& suite = results.suite;
-  double least = kNone, of_baseline = kNone;
-  std::string best;
+  const Summary *best = nullptr, *baseline = nullptr;
   for (const Summary* s : comparable(results, budget)) {
-    const double flip = s->flip;
-    const std::string& name = suite.methods[s->method].name;
-    if (name == suite.baseline) of_baseline = flip;
-    if (!(flip >= least)) least = flip, best = name;
+    if (suite.methods[s->method].name == suite.baseline) baseline = s;
+    if (!best || s->flip < best->flip) best = s;
   }
-  if (best.empty() || best == suite.baseline || !std::isfinite(least)) return "";
-  return fmt::format("To the eye, as FLIP measures it, '{}' is nearest to the reference: {:.2g}, '{}' {:.2g}.", best,
-                     least, suite.baseline, of_baseline);
+  if (!best || best == baseline || !std::isfinite(best->flip)) return "";
+  const std::string& name = suite.methods[best->method].name;
+  const double gain = baseline ? baseline->flip - best->flip : kNone;
+  if (baseline &&
+      !(gain > kSeen * baseline->flip && !(gain < kClearly * flip_noise(results, budget, *best, *baseline))))
+    return fmt::format(
+        "To the eye, as FLIP measures it, no method is clearly nearer to the reference than '{}' ({:.2g}; "
+        "'{}' {:.2g}).",
+        suite.baseline, baseline->flip, name, best->flip);
+  return fmt::format("To the eye, as FLIP measures it, '{}' is nearest to the reference: {:.2g}, '{}' {:.2g}.", name,
+                     best->flip, suite.baseline, baseline ? baseline->flip : kNone);
 }
 
 }  // namespace

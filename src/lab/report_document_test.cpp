@@ -268,7 +268,13 @@ TEST(ReportDocument, SaysWhichMethodHasTheLeastError) {
           "At equal time no method has less error than 'pt'; next is 'crn', with 1.2 times as much."}))
       << "a method that lacks a scene does not count";
   EXPECT_EQ(verdicts(results, 1),
-            std::vector<std::string>{"At equal time (10 s) 'iicv' has the lowest error: 2 times lower than 'pt'."});
+            std::vector<std::string>{"At equal time (10 s) 'iicv' has the lowest error: 2 times lower than 'pt' (no "
+                                     "interval is known from one seed)."});
+  results.summaries = {summary(0, 0, 2, one, {}), summary(1, 0, 2, {1.01, kNone, kNone, kNone}, {})};
+  EXPECT_EQ(verdicts(results, 0),
+            std::vector<std::string>{"At equal samples (24 spp) no method has clearly less error than 'pt': that of "
+                                     "'iicv' is 1 times lower (no interval is known from one seed), which these seeds "
+                                     "and scenes do not tell from 1."});
   results.summaries = {summary(0, 0, 2, one, one), summary(1, 0, 2, {19, kNone, 0.73, 500}, {})};
   EXPECT_EQ(verdicts(results, 0),
             std::vector<std::string>{"At equal samples (24 spp) no method has clearly less error than 'pt': that of "
@@ -278,6 +284,31 @@ TEST(ReportDocument, SaysWhichMethodHasTheLeastError) {
   EXPECT_EQ(verdicts(results, 0),
             std::vector<std::string>{"At equal samples (24 spp) 'iicv' has the lowest error: 6300 times lower than "
                                      "'pt' (150 to 4900000)."});
+}
+
+TEST(ReportDocument, JudgesFlipByWhatCanBeSeenAndTold) {
+  Results results = three_cells();
+  results.cells.clear();
+  results.summaries.clear();
+  const auto verdict_of = [&](double pt, double iicv, double noise) {
+    results.summaries.clear(), results.cells.clear();
+    for (const auto& [method, flip] : {std::pair{size_t{0}, pt}, {size_t{1}, iicv}}) {
+      Summary s;
+      s.method = method, s.n_scenes = results.suite.scenes.size(), s.flip = flip;
+      results.summaries.push_back(s);
+      Cell cell;
+      cell.method = method, cell.flip = {flip, noise, flip - 2 * noise, flip + 2 * noise};
+      results.cells.push_back(cell);
+    }
+    const std::vector<std::string> all = verdicts(results, 0);
+    return all.empty() ? "" : all.back();
+  };
+  const std::string unclear =
+      "To the eye, as FLIP measures it, no method is clearly nearer to the reference than 'pt' ";
+  EXPECT_EQ(verdict_of(0.0717, 0.0716, 1e-5), unclear + "(0.072; 'iicv' 0.072).") << "nobody sees that";
+  EXPECT_EQ(verdict_of(0.08, 0.07, 0.02), unclear + "(0.08; 'iicv' 0.07).") << "noise";
+  EXPECT_EQ(verdict_of(0.08, 0.07, 0.001),
+            "To the eye, as FLIP measures it, 'iicv' is nearest to the reference: 0.07, 'pt' 0.08.");
 }
 
 TEST(ReportDocument, ShowsTheBudgetOfTheSuite) {

@@ -101,7 +101,8 @@ MadeFile made_file(const std::string& path) {
     const auto found = attributes.find(std::string("covary:") + key);
     return found == attributes.end() ? std::string() : found->second;
   };
-  return {value(film_key::kMadeOf), value(film_key::kComplete) != "false", parse_real(value(film_key::kPredicted))};
+  return {value(film_key::kMadeOf), value(film_key::kComplete) != "false", parse_real(value(film_key::kPredicted)),
+          parse_real(value("samples")).value_or(0)};
 }
 
 bool reaches(const MadeFile& file, const std::string& made_of, double until) {
@@ -109,13 +110,15 @@ bool reaches(const MadeFile& file, const std::string& made_of, double until) {
          differences(file.made_of, made_of, true).empty();
 }
 
-void check_made_alike(const std::string& path, const std::string& made_of, bool continues) {
+void check_made_alike(const std::string& path, const std::string& made_of, bool continues, bool resumes) {
   const MadeFile file = made_file(path);
   if (file.made_of.empty()) return;
   if (const std::string differ = differences(file.made_of, made_of, continues); !differ.empty())
-    throw Error(ErrorCode::kInput, fmt::format("{}'{}' was rendered with other settings ({}); give another name, or "
-                                               "`overwrite` to replace it",
-                                               continues ? "`resume`: " : "", path, differ));
+    throw Error(ErrorCode::kInput,
+                fmt::format("{}'{}' was rendered with other settings ({}){}; give another name, or "
+                            "`overwrite` to replace it",
+                            resumes ? "`resume`: " : "", path, differ,
+                            resumes && !continues ? ", and its samples were not kept (`passes`)" : ""));
 }
 
 }  // namespace covary

@@ -34,6 +34,7 @@ struct MadeFile {
   std::string made_of;  ///< empty: unknown, or there is no image
   bool complete = false;
   std::optional<double> predicted;  ///< relMSE
+  double samples = 0;               ///< per pixel; 0: unknown
 };
 MadeFile made_file(const std::string& path);
 
@@ -41,7 +42,8 @@ MadeFile made_file(const std::string& path);
 bool reaches(const MadeFile& file, const std::string& made_of, double until);
 
 /// Throws Error(kInput) if the file at `path` is an image that covary made with other settings, according to its
-/// attribute; does nothing if there is no file, or one without the attribute.
-void check_made_alike(const std::string& path, const std::string& made_of, bool continues);
+/// attribute; does nothing if there is no file, or one without the attribute. `continues`: as for differences().
+/// `resumes`: the render was to be continued; without `continues`, its samples were not kept.
+void check_made_alike(const std::string& path, const std::string& made_of, bool continues, bool resumes);
 
 }  // namespace covary

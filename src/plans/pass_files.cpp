@@ -148,6 +148,22 @@ std::string pass_path(const Plan& plan, const RenderRequest& request, const Pass
   return folder.empty() ? "" : (folder / (pass.id() + ".exr")).string();
 }
 
+namespace {
+
+/// The path of a film in the folder; "" if there is none.
+std::string film_in(const fs::path& folder) {
+  std::error_code ignored;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
+    if (entry.path().extension() == ".exr") return entry.path().string();
+  return "";
+}
+
+}  // namespace
+
+bool asks_for_more(const RenderRequest& request, const MadeFile& picture) {
+  return request.until > 0 || (request.spp && *request.spp > picture.samples);
+}
+
 void check_earlier_films(const Plan& plan, const RenderRequest& request) {
   if (request.output.empty() || request.overwrite) return;
   const bool is_film = outputs_film(plan, request);
@@ -161,17 +177,18 @@ void check_earlier_films(const Plan& plan, const RenderRequest& request) {
                                            : "`resume` continues it, and `overwrite` replaces it"));
   std::error_code ignored;
   const bool has_folder = !is_film && !request.resume && request.passes.empty();
-  if (has_folder)
-    for (const fs::directory_entry& entry : fs::directory_iterator(passes_folder(request), ignored))
-      if (entry.path().extension() == ".exr")
-        throw Error(ErrorCode::kInput,
-                    fmt::format("'{}' already exists, in the folder for the films of this render; {}",
-                                entry.path().string(), kWaysOut));
+  const std::string unfinished = film_in(passes_folder(request));
+  if (has_folder && !unfinished.empty())
+    throw Error(ErrorCode::kInput, fmt::format("'{}' already exists, in the folder for the films of this render; {}",
+                                               unfinished, kWaysOut));
   // Films that are continued are compared themselves; those that would be replaced are refused when they are found.
   const bool has_films = fs::is_directory(request.passes, ignored) && !fs::is_empty(request.passes, ignored);
   const auto made_of = request.attributes.find(film_key::kMadeOf);
-  if (!continues && !has_films && made_of != request.attributes.end())
-    check_made_alike(request.output, made_of->second, request.resume);
+  if (continues || has_films || made_of == request.attributes.end()) return;
+  // Without films, all samples are taken again, which must not make a picture worse.
+  check_made_alike(request.output, made_of->second,
+                   request.resume && (!unfinished.empty() || asks_for_more(request, made_file(request.output))),
+                   request.resume);
 }
 
 void take_film_on_disk(const RenderRequest& request, const std::function<void(const std::string&)>& warn, Pass& pass) {

@@ -33,6 +33,7 @@ void check_light_groups(const LoadedScene& scene) {
 
 void check(const LoadedScene& scene, const Plan& plan, const RenderRequest& request) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
+  if (!plan.method) usage("the plan is empty; plan_of() makes one for a method");
   check_output(request.output);
   if (request.spp && (*request.spp < 1 || *request.spp > kMaxBudget))
     usage(fmt::format("{} samples per pixel; expected 1 to {}", *request.spp, kMaxBudget));

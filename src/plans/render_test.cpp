@@ -43,6 +43,8 @@ TEST(Render, OnePassIsTheFilmOfRenderPass) {
   EXPECT_EQ(result.picture().data, film.mean_image().data);
 }
 
+TEST(Render, AnEmptyPlanIsAUsageError) { EXPECT_THROW(render(load_sized(kRoom), Plan{}, request_of(6)), Error); }
+
 TEST(Render, ACropOutsideTheFrameAndImpossibleLimitsAreUsageErrors) {
   const LoadedScene scene = load_sized(kRoom);
   RenderRequest request = request_of(6);

@@ -49,7 +49,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
     const Film& film = last;
     std::map<std::string, std::string> attributes;
     for (const char* key : {film_key::kSeed, film_key::kSceneHash, film_key::kSettings, film_key::kVersion,
-                            film_key::kCommand, film_key::kMadeOf, film_key::kTimeChoice})
+                            film_key::kCommand, film_key::kMadeOf, film_key::kTimeChoice, film_key::kTrial})
       if (film.attributes.count(key)) attributes[std::string("covary:") + key] = film.attributes.at(key);
     const bool estimated = !result.image.estimate.data.empty();
     attributes["covary:estimator"] = estimated ? plan.method->text : kMeanName;

@@ -91,23 +91,33 @@ MotionLayers read_motion(const std::string& path, const MotionSource& source) {
   return layers;
 }
 
-double misfit(const Image& before, const Image& now, const MotionLayers& motion) {
-  // Only motion is tested, so depth is left out.
-  MotionLayers only_motion = motion;
-  only_motion.depth = Image(now.width, now.height, 1);
-  const History moved = reproject(before, only_motion.depth, only_motion);
-  double with = 0, without = 0;
-  for (size_t i = 0; i < moved.known.size(); ++i) {
-    if (!moved.known[i] ||
-        is_motion_edge(motion.motion, static_cast<int>(i) % now.width, static_cast<int>(i) / now.width))
+std::vector<double> misfits(const Image& before, const Image& now, std::span<const MotionLayers> motions) {
+  constexpr size_t kMinPart = 20;
+  std::vector<History> moved;
+  for (const MotionLayers& motion : motions) {
+    MotionLayers only_motion = motion;  // depth is not tested
+    only_motion.depth = Image(now.width, now.height, 1);
+    moved.push_back(reproject(before, only_motion.depth, only_motion));
+  }
+  const size_t n_pixels = static_cast<size_t>(now.width) * now.height;
+  std::vector<double> with(motions.size());
+  double without = 0;
+  size_t n_known = 0;
+  for (size_t i = 0; i < n_pixels; ++i) {
+    const int x = static_cast<int>(i) % now.width, y = static_cast<int>(i) / now.width;
+    if (!std::ranges::all_of(moved, [&](const History& m) { return m.known[i] != 0; }) ||
+        is_motion_edge(motions[0].motion, x, y))
       continue;
+    ++n_known;
     for (size_t c = 3 * i; c < 3 * i + 3; ++c) {
       const double brightness = std::abs(now.data[c]) + 0.1;
-      with += std::abs(moved.image.data[c] - now.data[c]) / brightness;
+      for (size_t m = 0; m < moved.size(); ++m) with[m] += std::abs(moved[m].image.data[c] - now.data[c]) / brightness;
       without += std::abs(before.data[c] - now.data[c]) / brightness;
     }
   }
-  return without > 0 ? with / without : 1;
+  const bool is_measured = without > 0 && kMinPart * n_known >= n_pixels;
+  for (double& sum : with) sum = is_measured ? sum / without : 1;
+  return with;
 }
 
 }  // namespace covary

@@ -2,7 +2,9 @@
 // Reads motion vectors from the frames of any renderer.
 #pragma once
 
+#include <span>
 #include <string>
+#include <vector>
 
 #include "sequences/reprojection.h"
 
@@ -27,9 +29,10 @@ bool has_motion(const std::string& path, const MotionSource& source);
 /// if the motion is missing.
 MotionLayers read_motion(const std::string& path, const MotionSource& source);
 
-/// How badly the motion matches two pictures, `now` being the later one: the mean difference between the reprojected
-/// picture and `now` over known pixels, divided by that without motion, each relative to brightness. Below 1, motion
-/// explains the changes. 1 if both pictures are equal or no pixel is known.
-double misfit(const Image& before, const Image& now, const MotionLayers& motion);
+/// How badly each motion matches two pictures, `now` being the later one: the mean difference between the reprojected
+/// picture and `now`, divided by that without motion, each relative to brightness, over the pixels that all motions
+/// know. Below 1, motion explains the changes. 1 if both pictures are equal, or less than a twentieth of the pixels is
+/// known.
+std::vector<double> misfits(const Image& before, const Image& now, std::span<const MotionLayers> motions);
 
 }  // namespace covary

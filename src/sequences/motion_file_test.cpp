@@ -96,10 +96,25 @@ Image waves(float dx, float dy) {
 
 TEST_F(MotionFile, FitsOrNot) {
   const auto moving = [&](float x, float y) { return read_motion(file({{"Motion.X", x}, {"Motion.Y", y}}), {}); };
-  EXPECT_LT(misfit(waves(0, 0), waves(2, 1), moving(2, 1)), 0.1);
-  EXPECT_GT(misfit(waves(0, 0), waves(2, 1), moving(-2, -1)), 1.2);
-  EXPECT_GT(misfit(waves(0, 0), waves(2, 1), moving(2, -1)), 0.3);
-  EXPECT_EQ(misfit(waves(0, 0), waves(0, 0), moving(0, 0)), 1);
+  const auto misfit = [&](const Image& before, const Image& now, float x, float y) {
+    const MotionLayers motion = moving(x, y);
+    return misfits(before, now, {&motion, 1})[0];
+  };
+  EXPECT_LT(misfit(waves(0, 0), waves(2, 1), 2, 1), 0.1);
+  EXPECT_GT(misfit(waves(0, 0), waves(2, 1), -2, -1), 1.2);
+  EXPECT_GT(misfit(waves(0, 0), waves(2, 1), 2, -1), 0.3);
+  EXPECT_EQ(misfit(waves(0, 0), waves(0, 0), 0, 0), 1);
+}
+
+TEST_F(MotionFile, FitsAreOfTheSamePixels) {
+  // On the left, where only motion to the right is known, nothing fits; elsewhere to the left does.
+  const auto moving = [&](float x) { return read_motion(file({{"Motion.X", x}, {"Motion.Y", 0}}), {}); };
+  Image now = waves(2, 0);
+  for (int y = 0; y < kHeight; ++y)
+    for (int c = 0; c < 3; ++c) now.pixel(kWidth - 1, y)[c] = now.pixel(kWidth - 2, y)[c] = 50;
+  const std::vector<MotionLayers> both = {moving(2), moving(-2)};
+  EXPECT_LT(misfits(waves(0, 0), now, both)[0], 0.1);
+  EXPECT_EQ(misfits(waves(0, 0), now, std::vector{moving(static_cast<float>(kWidth))})[0], 1) << "no pixel is known";
 }
 
 }  // namespace

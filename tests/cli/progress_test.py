@@ -212,9 +212,16 @@ class Summary(CliTest):
                  "--seed", "2")
         self.assertEqual(self.run_covary(*RENDER, "--spp", "8", "--estimator", "none", "-o", "a.exr",
                                          "--overwrite").returncode, 0)
-        self.bad(1, "--resume: 'b.exr' was rendered with other settings (estimator none, now default); ", *RENDER,
+        self.bad(1, "--resume: 'b.exr' was rendered with other settings (estimator none, now default)", *RENDER,
                  *self.made("b.exr", "--spp", "4", "--estimator", "none"), "--spp", "4", "--resume")
-        self.bad(1, "--resume: 'c.exr' was rendered with other settings (estimator default, now none); ", *RENDER,
+        self.bad(1, "--resume: 'd.exr' was rendered with other settings (spp 8, now 4), and its samples were not kept "
+                 "(--passes); give another name, or --overwrite to replace it", *RENDER,
+                 *self.made("d.exr", "--spp", "8", "--oidn", "off"), "--oidn", "off", "--spp", "4", "--resume")
+        again = (*RENDER, "-o", "d.exr", "--oidn", "off", "--resume")
+        self.assertIn("d.exr: complete, with a predicted relMSE of 0.", self.good(*again, "--spp", "8").stderr)
+        self.assertIn("note: the samples of 'd.exr' were not kept (--passes); all are rendered\n",
+                      self.good(*again, "--spp", "12").stderr)
+        self.bad(1, "--resume: 'c.exr' was rendered with other settings (estimator default, now none)", *RENDER,
                  *self.made("c.exr", "--spp", "4"), "--spp", "4", "--estimator", "none", "--resume")
         frames = (*RENDER, "--spp", "4", "--estimator", "none", "--frames", "1-2", "-o", "f_#.exr")
         for _ in range(2):

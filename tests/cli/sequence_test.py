@@ -417,6 +417,42 @@ class Denoise(SequenceTest):
             process.kill()
         self.assert_same_frames("watched", "all")
 
+    def test_resume_makes_damaged_frames_again(self):
+        inputs = ("a_#.exr", "b_#.exr", "-o")
+        self.assertEqual(self.denoise(*inputs, "whole_#.exr").returncode, 0)
+        self.assertEqual(self.denoise(*inputs, "part_#.exr").returncode, 0)
+        (self.path / "part_1.exr").write_bytes(b"")
+        whole = (self.path / "part_3.exr").read_bytes()
+        (self.path / "part_3.exr").write_bytes(whole[:len(whole) // 2])
+        said = self.denoise(*inputs, "part_#.exr", "--resume")
+        self.assertEqual(said.returncode, 0, said.stderr)
+        for name in ("part_1.exr", "part_3.exr"):
+            self.assertRegex(said.stderr, rf"(?m)^warning: {name}: .*; it is made again$")
+        self.assert_same_frames("part", "whole")
+        (self.path / "part_2.exr").write_text("of somebody else")
+        said = self.denoise(*inputs, "part_#.exr", "--resume")
+        self.assertEqual((said.returncode, (self.path / "part_2.exr").read_text()), (1, "of somebody else"))
+
+    def test_resume_refuses_frames_of_other_settings(self):
+        inputs = ("denoise", "a_#.exr", "b_#.exr", "-o", "d_#.exr", "--oidn", "off", "--frames", "1-2")
+        self.good(*inputs)
+        before = self.picture("d_1.exr")
+        self.bad(1, "--resume: 'd_1.exr' was made by 'mixture --denoise auto --oidn off', and not by 'mixture "
+                 "--denoise bias --oidn off'; --overwrite instead of --resume replaces it", *inputs, "--mode", "bias",
+                 "--resume")
+        self.good(*inputs, "--mode", "bias", "--overwrite")
+        self.assertNotEqual(self.picture("d_1.exr"), before)
+
+    def test_own_motion_is_trusted(self):
+        """A fast pan and few samples: noise decides which motion fits."""
+        self.write_path((1, START), (3, END))
+        for name in "mn":
+            self.good_render("-o", f"{name}_#.exr", "--spp", "1", "--resolution", "64x48", "--seed", str(ord(name)),
+                             frames="1-3")
+        done = self.denoise("m_#.exr", "n_#.exr", "-o", "p_#.exr")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("covary:history", (self.path / "p_3.exr").read_bytes().decode("latin-1"))
+
     def test_resume_leaves_out_frames_of_interrupted_renders(self):
         for n in (1, 2, 3):
             for seed, name in enumerate("ab"):

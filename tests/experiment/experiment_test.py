@@ -443,6 +443,10 @@ class Programs(ExperimentTest):
         suite = json.loads(done.stdout)
         self.assertEqual(suite["methods"][1:], [{"name": "b", "options": [], "program": "b", "renders": False}])
         self.assertEqual(Path(suite["scenes"][0]["file"]).name, "room.xml")
+        self.suite["scenes"] = [{"name": "own", "file": "own.xml"}, {"name": "box", "file": "box"}]
+        (self.path / "named.json").write_text(json.dumps(self.suite))
+        suite = json.loads(self.run_covary([COVARY, "experiment", str(self.path / "named.json"), "--print"]).stdout)
+        self.assertEqual([scene["file"] for scene in suite["scenes"]], ["own.xml", str(SCENES / "box.xml")])
 
     def test_given_images(self):
         """Of which the program says how long they took."""

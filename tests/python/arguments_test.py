@@ -38,7 +38,7 @@ def without_none(values):
 COMBINE = {"crn": without_none(NO_GROUPS), "independent": NO_GROUPS, "estimator": ("iicvv", "", *NO_TEXT),
            "light": (3, "x", [1]), "counts": (3, "x", [1], -numpy.ones((20, 24), int), numpy.ones((3, 3), int)),
            "samples": without_none(NO_SPP), "denoise": ("yes", "", *NO_TEXT), "albedo": without_none(NO_IMAGE),
-           "normal": without_none(NO_IMAGE), "denoising_albedo": without_none(NO_IMAGE),
+           "normal": without_none(NO_IMAGE), "denoising_albedo": without_none(NO_IMAGE), "clean_features": NO_FLAG,
            "denoising_normal": without_none(NO_IMAGE), "position": without_none(NO_IMAGE),
            "layers": (3, "x", [1], {"a": 3}, {3: NO_IMAGE}), "oidn": ("/nowhere", *NO_TEXT),
            "device": ("gpu7", *NO_TEXT), "std_error": (1, "yes"), "force": NO_FLAG,
@@ -315,11 +315,11 @@ class Arguments(PackageTest):
                          "file, and covary comes with no scene of that name, but with .*room")
 
     def test_options_of_combining_are_arguments(self):
-        """All that the library declares, under their names but for these; features are five images, and some are of
-        files and of the program alone."""
+        """All that the library declares, under their names but for these; features are five images and a word
+        on them, and some options are of files and of the program alone."""
         declared = {option["name"].replace("-", "_"): option for option in covary._covary.combine_options()}
         other = {"error": ["std_error"], "features": ["albedo", "normal", "denoising_albedo", "denoising_normal",
-                                                  "position"]}
+                                                  "position", "clean_features"]}
         files = {"output", "crn_layer", "independent_layer", "explain", "memory"}
         arguments = inspect.signature(covary.combine).parameters
         self.assertEqual({name for option in declared if option not in files for name in other.get(option, [option])},

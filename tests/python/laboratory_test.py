@@ -180,8 +180,18 @@ class Experiments(PackageTest):
         line = inspect.getsourcelines(wrong)[1] + 1
         self.assertIn(f"room, wrong, 16 spp: ValueError: no idea (laboratory_test.py, line {line})",
                       self.message_of(covary.InputError, self.experiment, wrong=wrong))
-        self.assertIn("the shape [3]", self.message_of(covary.InputError, self.experiment,
-                                                       flat=lambda samples: numpy.zeros(3)))
+        self.assertIn("the function returned the shape [3]; expected [24, 32, 3]", self.message_of(
+            covary.InputError, self.experiment, flat=lambda samples: numpy.zeros(3)))
+        self.assertIn("the function returned None", self.message_of(
+            covary.InputError, self.experiment, none=lambda samples: None))
+
+    def test_the_same_image_for_all_seeds_is_told(self):
+        warnings = self.experiment(flat=lambda samples: numpy.full((24, 32, 3), 0.4)).results["warnings"]
+        self.assertIn("room, flat, 16 spp: the images of all seeds are the same: is the seed used? (a program's "
+                      "COVARY_SEED)", warnings)
+        self.assertEqual(len([text for text in warnings if "are the same" in text]), 1)
+
+    def test_wrong_suites(self):
         self.assertIn("no suite is named 'quik'; did you mean 'quick'?",
                       self.message_of(covary.UsageError, self.experiment, "quik"))
         self.assertIn("no suite is named 'roomy'; did you mean 'room'?",
