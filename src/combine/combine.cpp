@@ -31,9 +31,9 @@ namespace {
 
 constexpr int kLightRows = 64;  // rows of the light film in memory at a time
 constexpr int kMinRows = 16;
-/// Bands that share more than pixels have at least so many times the rows around them, if memory allows: those are
-/// computed twice.
-constexpr int kUsefulRows = 6;
+/// Bands that share more than pixels have at least so many times the rows around them, if memory allows: a part of the
+/// work on those is done twice.
+constexpr int kUsefulRows = 5;
 constexpr double kImagesOfLayer = 12;
 
 int groups_of(const std::optional<GroupedSource>& source) { return source ? source->groups : 0; }
@@ -150,7 +150,9 @@ double memory_of_rows(const CombineRequest& request, int rows) {
   // For bands: the estimate of the whole image; its standard error and bias are stored beside them.
   const double of_whole = n_features * kImage + (in_bands ? 3 * kImage + request.estimator.memory.of_whole : 0);
   const double library = request.estimator.network.empty() ? 0 : network_library_memory();
-  const double results = of_whole * width * request.independent.height + library;
+  const double kept =
+      in_bands && rows > 0 && request.estimator.image_in_rows ? memory_of_kept_rows(request.estimator.reach, width) : 0;
+  const double results = of_whole * width * request.independent.height + library + kept;
   const double layers = request.layers.empty() ? 0 : static_cast<double>(request.layers.size() + 1);
   const double of_method =
       mixes_mean(request) ? memory_of_mixture(request, n_pixels) : request.estimator.memory.bytes(n_pixels, groups);
@@ -164,7 +166,8 @@ namespace {
 int rows_within(const CombineRequest& request, double memory) {
   const int height = request.independent.height;
   if (memory_of_rows(request, height) <= memory) return height;
-  const double results = memory_of_rows(request, 0), row = memory_of_rows(request, 1) - results;
+  const double row = memory_of_rows(request, 2) - memory_of_rows(request, 1),
+               results = memory_of_rows(request, 1) - row;
   return static_cast<int>(std::clamp((memory - results) / row, 0.0, height - 1.0));
 }
 

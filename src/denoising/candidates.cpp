@@ -8,8 +8,6 @@
 #include <utility>
 
 #include "denoising/mirrored_halves.h"
-#include "filters/nl_means.h"
-#include "filters/regression.h"
 #include "filters/residual_correction.h"
 
 namespace covary {
@@ -35,8 +33,8 @@ Image combined(const Image& a, const Image& b, const Operation& operation) {
 
 struct FilterFeatures : RegressionFeatures {
   Planes all, normal;
-  Image albedo;       // at least kMinAlbedo; empty where there is none
-  int first_row = 0;  // of a larger image
+  Image albedo;  // at least kMinAlbedo; empty where there is none
+  WantedRows wanted;
 };
 
 FilterFeatures filter_features(const Features& features, FilterKinds kinds) {
@@ -63,7 +61,7 @@ const Planes* or_null(const Planes& planes) { return planes.count() > 0 ? &plane
 std::vector<Image> regressed(const FilterFeatures& features, const CandidateInput& in,
                              std::vector<const Image*> sources, std::span<const Image> others) {
   RegressionInput input{in.estimate,       in.std_error, std::move(sources), {},
-                        features.position, in.part > 0,  features.first_row};
+                        features.position, in.part > 0,  features.wanted};
   for (const Image& other : others) input.others.push_back(&other);
   return regressed(input, features.features, *in.valid);
 }
@@ -80,7 +78,7 @@ std::vector<std::vector<Image>> filtered(const FilterFeatures& features, Candida
       if (base == CandidateBase::kPair) sharp.push_back(in.independent);
       steerings.push_back({in.estimate, in.std_error, {{kSharpBandwidth, sharp}, {kSmoothBandwidth, {in.estimate}}}});
     }
-    images = nl_means(steerings, or_null(features.all), *inputs[0].valid, features.first_row);
+    images = nl_means(steerings, or_null(features.all), *inputs[0].valid, features.wanted);
     const size_t n = images.size() / inputs.size();
     for (size_t i = 0; i < images.size(); ++i) all[i / n].push_back(std::move(images[i]));
     if (features.albedo.data.empty()) return all;
@@ -92,7 +90,7 @@ std::vector<std::vector<Image>> filtered(const FilterFeatures& features, Candida
     const Image& error = demodulated.emplace_back(combined(*in.std_error, features.albedo, std::divides<>()));
     steerings.push_back({&image, &error, {{kSharpBandwidth, {&image}}}});
   }
-  images = nl_means(steerings, or_null(features.normal), *inputs[0].valid, features.first_row);
+  images = nl_means(steerings, or_null(features.normal), *inputs[0].valid, features.wanted);
   demodulated.clear(), steerings.clear();
   for (size_t i = 0; i < all.size(); ++i) {
     all[i].push_back(combined(images[i], features.albedo, std::multiplies<>()));
@@ -113,7 +111,7 @@ std::vector<std::vector<Image>> filtered_layers(const FilterFeatures& features, 
   std::vector<std::vector<Image>> all;
   if (features.nl_means) {
     steerings = {{in.estimate, in.std_error, {{kSharpBandwidth, sources}, {kSmoothBandwidth, sources}}}};
-    images = nl_means(steerings, or_null(features.all), *in.valid, features.first_row);
+    images = nl_means(steerings, or_null(features.all), *in.valid, features.wanted);
     all.emplace_back(images.begin(), images.begin() + n);
     all.emplace_back(images.begin() + n, images.end());
     if (features.albedo.data.empty()) return all;
@@ -125,7 +123,7 @@ std::vector<std::vector<Image>> filtered_layers(const FilterFeatures& features, 
   for (const Image& layer : layers)
     without_albedo.push_back(&demodulated.emplace_back(combined(layer, features.albedo, std::divides<>())));
   steerings = {{&demodulated[0], &demodulated[1], {{kSharpBandwidth, without_albedo}}}};
-  images = nl_means(steerings, or_null(features.normal), *in.valid, features.first_row);
+  images = nl_means(steerings, or_null(features.normal), *in.valid, features.wanted);
   for (Image& image : images) image = combined(image, features.albedo, std::multiplies<>());
   all.push_back(std::move(images));
   if (!features.features.empty()) all.insert(all.begin(), regressed(features, in, sources, all.back()));
@@ -212,9 +210,10 @@ std::vector<std::string> filter_names(const Features& features, CandidateBase ba
   return names;
 }
 
-CandidateMaker filtered_candidates(const Features& features, CandidateBase base, FilterKinds kinds, int first_row) {
+CandidateMaker filtered_candidates(const Features& features, CandidateBase base, FilterKinds kinds,
+                                   const WantedRows& wanted) {
   const auto kept = std::make_shared<FilterFeatures>(filter_features(features, kinds));
-  kept->first_row = first_row;
+  kept->wanted = wanted;
   CandidateMaker maker;
   maker.names = filter_names(features, base, kinds);
   maker.make = [kept, base](std::span<const CandidateInput> inputs) { return filtered(*kept, base, inputs); };

@@ -22,8 +22,11 @@
 
 #include "denoising/denoise.h"
 #include "estimators/method.h"
+#include "filters/nl_means.h"
 #include "filters/planes.h"
+#include "filters/regression.h"
 #include "filters/residual_correction.h"
+#include "filters/wanted_rows.h"
 
 namespace covary {
 
@@ -84,11 +87,10 @@ struct RegressionFeatures {
 RegressionFeatures regression_features(const Features& features, FilterKinds kinds);
 /// The names of filtered_candidates(), in order.
 std::vector<std::string> filter_names(const Features& features, CandidateBase base, FilterKinds kinds);
-/// Candidates without a network. The features must outlive the result. `first_row`: of a larger image if these are rows
-/// of it, a multiple of kRegressionCell; kCandidateReach rows from those that are missing, the bits are those of the
-/// whole.
+/// Candidates without a network. The features must outlive the result. Rows of a larger image begin at a multiple of
+/// kRegressionCell; kCandidateReach rows from those that are missing, the bits are those of the whole.
 CandidateMaker filtered_candidates(const Features& features, CandidateBase base = CandidateBase::kPair,
-                                   FilterKinds kinds = FilterKinds::kNlMeans, int first_row = 0);
+                                   FilterKinds kinds = FilterKinds::kNlMeans, const WantedRows& wanted = {});
 /// Throws Error(kInput) for auxiliary images with values that cannot be used (check_feature() of denoise.h).
 void check_features(const Features& features);
 /// The features for a neural network: those seen in mirrors and through glass, if available.
@@ -114,5 +116,8 @@ CandidateMaker neural_candidates(const Features& features, const DenoiseOptions&
 
 /// Radius of influence of the input, and of the network's images, on a pixel of any candidate, in rows.
 inline constexpr int kCandidateReach = 36;
+/// The same without a network.
+inline constexpr int kFiltersReach = kRegressionReach;
+static_assert(kFiltersReach >= kNlMeansReach);
 
 }  // namespace covary

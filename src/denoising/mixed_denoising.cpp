@@ -236,8 +236,8 @@ RowsMethod rows_of_mean(bool with_oidn) {
     parts.features = settings.features;
     return parts;
   };
-  method.filters = [with_oidn](const Features& features, int first_row) {
-    return filtered_candidates(features, CandidateBase::kMean, kinds_of_mean(with_oidn), first_row);
+  method.filters = [with_oidn](const Features& features, const WantedRows& wanted) {
+    return filtered_candidates(features, CandidateBase::kMean, kinds_of_mean(with_oidn), wanted);
   };
   method.are_enough = [](const Samples& rows) { return can_be_mixed(rows.independent); };
   method.of_few = [](const Samples& rows, const MethodSettings&, const std::vector<CandidateMaker>& makers) {
@@ -255,8 +255,8 @@ RowsMethod rows_of_pair(const Method& base) {
     parts.features = settings.features;
     return parts;
   };
-  method.filters = [](const Features& features, int first_row) {
-    return filtered_candidates(features, CandidateBase::kPair, FilterKinds::kNlMeans, first_row);
+  method.filters = [](const Features& features, const WantedRows& wanted) {
+    return filtered_candidates(features, CandidateBase::kPair, FilterKinds::kNlMeans, wanted);
   };
   method.are_enough = [n = 2 * base.min_groups](const Samples& rows) {
     return std::min(rows.crn.groups, rows.independent.groups) >= n;

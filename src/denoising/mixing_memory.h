@@ -16,6 +16,9 @@ double bytes_of_mixture(const MixtureSize& size);
 /// Bytes of the network and of what is in memory while it denoises an image of so many pixels in one piece.
 double memory_beside_network(const MixtureSize& size, double n_pixels);
 
+/// Bytes of the rows that bands of this radius of influence keep for the next, in images of so many columns.
+double memory_of_kept_rows(int reach, double width);
+
 /// Bytes per pixel around the image of a pair of passes, beside what its estimator takes.
 double bytes_of_pair_mixture(bool with_network);
 

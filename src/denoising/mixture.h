@@ -76,7 +76,7 @@ struct SampledRows {
 /// evenly distributed.
 std::vector<SampledRows> sampled_rows(int width, int height);
 inline constexpr double kMaxSampledPixels = 1 << 21;
-inline constexpr int kSampledBlocks = 8;
+inline constexpr int kSampledBlocks = 4;
 
 struct Mixture {
   Image image;

@@ -127,6 +127,14 @@ CandidateInput input_of(const DenoisingPart& part, const Image& h, const std::ve
 std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>& parts,
                                         const std::vector<unsigned char>& valid,
                                         const std::vector<CandidateMaker>& makers, int first) {
+  std::vector<CandidateSet> sets = made_candidates(parts, valid, makers, first);
+  add_weighed(parts, valid, makers, sets);
+  return sets;
+}
+
+std::vector<CandidateSet> made_candidates(const std::vector<const DenoisingPart*>& parts,
+                                          const std::vector<unsigned char>& valid,
+                                          const std::vector<CandidateMaker>& makers, int first) {
   std::deque<Image> h;
   std::vector<CandidateInput> inputs;
   std::vector<CandidateSet> sets;
@@ -144,9 +152,14 @@ std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>&
   }
   for (size_t i = 0; i < sets.size(); ++i)
     if (parts[i]->limited && has_network(makers)) limit_by_network(inputs[i], sets[i]);
-  for (const CandidateMaker& maker : makers)
-    for (size_t i = 0; maker.shares && i < sets.size(); ++i) add_weighed(maker, inputs[i], sets[i]);
   return sets;
+}
+
+void add_weighed(const std::vector<const DenoisingPart*>& parts, const std::vector<unsigned char>& valid,
+                 const std::vector<CandidateMaker>& makers, std::vector<CandidateSet>& sets) {
+  for (const CandidateMaker& maker : makers)
+    for (size_t i = 0; maker.shares && i < sets.size(); ++i)
+      add_weighed(maker, input_of(*parts[i], parts[i]->image.estimate, valid), sets[i]);
 }
 
 namespace {
@@ -181,9 +194,8 @@ int mixture_reach(bool is_mean, const PartsWeighting& chosen) {
   return kCellsReach + (chosen.residual_correction && !is_mean ? residual_correction_reach({}) : 0);
 }
 
-std::vector<NormalRow> normal_rows_of(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
+std::vector<NormalRow> normal_rows_of(const DenoisingParts& parts, std::vector<CandidateSet> sets,
                                       const PartsWeighting& chosen, int first, int end) {
-  std::vector<CandidateSet> sets = candidates_of({&parts.halves[0], &parts.halves[1]}, parts.valid, makers, 1);
   MixedParts mixed{{}, {std::move(sets[0]), std::move(sets[1])}, {}, {}};
   return normal_rows(input_of_halves(parts, chosen, mixed), first, end);
 }
@@ -200,8 +212,12 @@ std::vector<float> weights_of_whole(bool is_mean, const std::vector<CandidateMak
 
 MixedParts mix_parts(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
                      const PartsWeighting& chosen, const WholeImage* whole) {
-  std::vector<CandidateSet> sets =
-      candidates_of({&parts.whole, &parts.halves[0], &parts.halves[1]}, parts.valid, makers);
+  return mix_sets(parts, candidates_of({&parts.whole, &parts.halves[0], &parts.halves[1]}, parts.valid, makers), makers,
+                  chosen, whole);
+}
+
+MixedParts mix_sets(const DenoisingParts& parts, std::vector<CandidateSet> sets,
+                    const std::vector<CandidateMaker>& makers, const PartsWeighting& chosen, const WholeImage* whole) {
   MixedParts mixed{std::move(sets[0]), {std::move(sets[1]), std::move(sets[2])}, {}, {}};
   MixtureInput input = input_of_halves(parts, chosen, mixed);
   input.whole = &mixed.whole;

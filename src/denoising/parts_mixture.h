@@ -36,6 +36,13 @@ std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>&
                                         const std::vector<unsigned char>& valid,
                                         const std::vector<CandidateMaker>& makers, int first = 0);
 
+/// The same in two steps: those of the parts alone, and then those that consist of the others.
+std::vector<CandidateSet> made_candidates(const std::vector<const DenoisingPart*>& parts,
+                                          const std::vector<unsigned char>& valid,
+                                          const std::vector<CandidateMaker>& makers, int first = 0);
+void add_weighed(const std::vector<const DenoisingPart*>& parts, const std::vector<unsigned char>& valid,
+                 const std::vector<CandidateMaker>& makers, std::vector<CandidateSet>& sets);
+
 /// The first candidate, an image with little noise.
 inline const Image& guide_of(const CandidateSet& set) { return set.candidates[0]; }
 
@@ -56,8 +63,14 @@ struct WholeImage {
 MixedParts mix_parts(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
                      const PartsWeighting& chosen, const WholeImage* whole = nullptr);
 
-/// The sums over rows first … end - 1 from which WholeImage::everywhere follows.
-std::vector<NormalRow> normal_rows_of(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
+/// The mixture of these candidates, of all samples and of both halves.
+MixedParts mix_sets(const DenoisingParts& parts, std::vector<CandidateSet> sets,
+                    const std::vector<CandidateMaker>& makers, const PartsWeighting& chosen,
+                    const WholeImage* whole = nullptr);
+
+/// The sums over rows first … end - 1 from which WholeImage::everywhere follows. `sets`: the candidates of both
+/// halves.
+std::vector<NormalRow> normal_rows_of(const DenoisingParts& parts, std::vector<CandidateSet> sets,
                                       const PartsWeighting& chosen, int first, int end);
 /// WholeImage::everywhere from the rows of the sample; empty if there is no prior. `samples`: mean_samples().
 std::vector<float> weights_of_whole(bool is_mean, const std::vector<CandidateMaker>& makers,

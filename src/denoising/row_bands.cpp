@@ -12,19 +12,22 @@ namespace covary {
 
 static_assert(kBandCell % kResidualCell == 0 && kBandCell % kRegressionCell == 0 && kBandCell % kWeighingRows == 0);
 
-std::vector<RowBand> bands_of(int height, int rows_at_once, int reach, int first, int end) {
-  const int step = std::max(kBandCell, (rows_at_once - 2 * reach) / kBandCell * kBandCell - kBandCell);
+std::vector<RowBand> bands_of(int height, int rows_at_once, const RowReach& reach, int first, int end) {
+  const int step = std::max(kBandCell, (rows_at_once - reach.above - reach.below) / kBandCell * kBandCell - kBandCell);
   std::vector<RowBand> bands;
   for (int y = first; y < end; y += step) {
-    const int n = std::min(step, end - y), begin = std::max(0, y - reach) / kBandCell * kBandCell;
-    bands.push_back({begin, std::min(height, y + n + reach) - begin, y - begin, y, n});
+    const int n = std::min(step, end - y), begin = std::max(0, y - reach.above) / kBandCell * kBandCell;
+    bands.push_back({begin, std::min(height, y + n + reach.below) - begin, y - begin, y, n});
   }
   return bands;
 }
 
+int weighing_reach(CandidateBase base, bool with_network) {
+  return base == CandidateBase::kMean && !with_network ? kWeighingReach : 0;
+}
+
 int candidates_reach(CandidateBase base, bool with_network, int reach_of_parts) {
-  const bool is_weighed = base == CandidateBase::kMean && !with_network;
-  return reach_of_parts + kCandidateReach + (is_weighed ? kWeighingReach : 0);
+  return reach_of_parts + kCandidateReach + weighing_reach(base, with_network);
 }
 
 int mixed_reach(CandidateBase base, bool with_network, int reach_of_parts, const PartsWeighting& weighting) {

@@ -18,10 +18,18 @@ inline constexpr int kBandCell = 24;
 struct RowBand {
   int first = 0, rows = 0, skipped = 0, y = 0, n = 0;
 };
-/// Bands of an image of `height` rows that hold its rows first … end - 1, and `reach` more on both sides: of at most
-/// `rows_at_once` rows if that is more than twice the reach.
-std::vector<RowBand> bands_of(int height, int rows_at_once, int reach, int first, int end);
+/// Rows that a band needs beside those that are wanted.
+struct RowReach {
+  int above = 0, below = 0;
+  RowReach(int both) : above(both), below(both) {}
+  RowReach(int rows_above, int rows_below) : above(rows_above), below(rows_below) {}
+};
+/// Bands of an image of `height` rows that hold its rows first … end - 1, and those that they reach: of at most
+/// `rows_at_once` rows if these are more than the reach.
+std::vector<RowBand> bands_of(int height, int rows_at_once, const RowReach& reach, int first, int end);
 
+/// Radius of influence of the candidates that are made of the images on all candidates.
+int weighing_reach(CandidateBase base, bool with_network);
 /// Radius of influence of the images on a pixel of any candidate, and of the mixture with its error. `reach_of_parts`:
 /// on what the candidates are made of.
 int candidates_reach(CandidateBase base, bool with_network, int reach_of_parts);

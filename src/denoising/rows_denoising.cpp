@@ -7,6 +7,7 @@
 
 #include "denoising/mixed_rows.h"
 #include "denoising/row_bands.h"
+#include "denoising/rows_of_parts.h"
 #include "denoising/weighed_candidate.h"
 #include "estimators/result_rows.h"
 #include "risk/halves.h"
@@ -20,6 +21,46 @@ struct Band {
   Samples rows;
   FeatureRows features;
   MethodSettings settings;
+};
+
+/// Rows first … of the image, as the whole has them: the samples' images, and their candidates of rows before `made`.
+struct MadeRows {
+  int first = 0, made = 0;
+  DenoisingParts parts;
+  std::vector<CandidateSet> sets;  ///< of all samples and of both halves, or of the halves alone
+  std::vector<CandidateMaker> makers;
+  std::shared_ptr<FeatureRows> features;
+
+  int end() const { return first + parts.whole.image.estimate.height; }
+  std::vector<const DenoisingPart*> parts_of_sets() const {
+    std::vector<const DenoisingPart*> all = {&parts.whole, &parts.halves[0], &parts.halves[1]};
+    return {all.end() - static_cast<ptrdiff_t>(sets.size()), all.end()};
+  }
+  /// Adds the candidates that consist of others.
+  void weigh() {
+    add_weighed(parts_of_sets(), parts.valid, makers, sets);
+    features.reset();
+  }
+};
+
+/// Rows that the next band has, too.
+struct KeptRows {
+  int made = 0;
+  DenoisingParts parts;
+  std::vector<std::vector<Image>> candidates;
+
+  KeptRows() = default;
+  KeptRows(int first, const MadeRows& rows)
+      : made(rows.made),
+        parts(rows_of(rows.parts, first - rows.first, rows.end() - first)),
+        candidates(rows_of(rows.sets, first - rows.first, rows.made - first)) {}
+};
+
+/// What is left of rows `first` to `end` - 1 of an image if they begin with cells.
+struct Rows {
+  int first, n;
+  Rows(int wanted, int end, int height)
+      : first(std::max(0, wanted) / kBandCell * kBandCell), n(std::min(height, end) - first) {}
 };
 
 class RowsDenoising {
@@ -36,13 +77,11 @@ class RowsDenoising {
     MixedRows whole;
     std::vector<CandidateMaker> makers;
     std::string base;
-    for_each_band(rows_reach(method_), 0, image_.height, [&](const Band& band, int y, int n) {
-      makers = makers_of(band);
-      const DenoisingParts parts = method_.parts(band.rows, band.settings);
-      base = parts.name;
-      const MixedParts mixed = mix_parts(parts, makers, method_.weighting, &whole_);
-      append(mixed_rows(parts, mixed, makers, settings_.std_error), band.skipped, y, n, image_.height, whole);
-      whole.result.nonfinite_pixels += unusable(band, n);
+    const int of_mixture = kErrorReach + mixture_reach(is_mean, method_.weighting);
+    for_each_made(of_mixture + of_weighing(), 0, image_.height, true, [&](const RowBand& band, MadeRows& rows) {
+      rows.weigh();
+      append_mixed({band.y - of_mixture, band.y + band.n + of_mixture, image_.height}, band, rows, whole);
+      makers = std::move(rows.makers), base = rows.parts.name;
     });
     MethodImage result = finish(std::move(whole), makers, base);
     result.network_runs = network_ ? network_->runs : 0;
@@ -59,6 +98,70 @@ class RowsDenoising {
       band.settings.features = band.features.features;
       f(band, b.y, b.n);
     }
+  }
+
+  int of_candidates() const { return method_.network ? kCandidateReach : kFiltersReach; }
+  int of_weighing() const { return weighing_reach(method_.base, method_.network.has_value()); }
+
+  /// Calls f(band, rows) for bands that hold rows first … end - 1 and `reach` more on both sides, with the candidates
+  /// of all of these, which f may use up. `with_whole`: of all samples, too.
+  template <typename Function>
+  void for_each_made(int reach, int first, int end, bool with_whole, const Function& f) const {
+    const int around = method_.reach_of_parts, below = std::max(reach + of_candidates(), around);
+    const int above = first > 0 ? below : std::max({reach, of_candidates(), around});  // there, candidates are kept
+    const int of_first = first > 0 ? 2 * around + kBandCell : 0;
+    const std::vector<RowBand> bands =
+        bands_of(image_.height, image_.rows_at_once - of_first, {above, below}, first, end);
+    KeptRows kept;
+    for (size_t i = 0; i < bands.size(); ++i) {
+      MadeRows rows = made_rows(bands[i], std::min(image_.height, bands[i].y + bands[i].n + reach), with_whole,
+                                std::exchange(kept, {}));
+      if (i + 1 < bands.size()) kept = KeptRows(bands[i + 1].first, rows);
+      f(bands[i], rows);
+    }
+  }
+
+  /// The rows of a band, with candidates up to row `made`.
+  MadeRows made_rows(const RowBand& band, int made, bool with_whole, KeptRows kept) const {
+    MadeRows rows{
+        .first = band.first, .made = made, .parts = std::move(kept.parts), .sets = {}, .makers = {}, .features = {}};
+    const bool has_kept = !kept.candidates.empty();
+    const int from = has_kept ? rows.end() : band.first, end = band.first + band.rows;
+    if (from < end) append_rows(parts_of_rows(from, end), rows.parts);
+    rows.features = std::make_shared<FeatureRows>(settings_.features, band.first, band.rows);
+    const int first = has_kept ? kept.made - band.first : band.first > 0 ? of_candidates() : 0;
+    rows.makers = makers_of(rows.features->features, {band.first, first, made - band.first}, band.rows);
+    rows.sets.resize(with_whole ? 3 : 2);
+    rows.sets = made_candidates(rows.parts_of_sets(), rows.parts.valid, rows.makers, with_whole ? 0 : 1);
+    for (CandidateMaker& maker : rows.makers) maker.make = {}, maker.make_layers = {};  // and what they hold
+    set_rows(kept.candidates, rows.sets);
+    return rows;
+  }
+
+  DenoisingParts parts_of_rows(int from, int end) const {
+    const Rows around(from - method_.reach_of_parts, end + method_.reach_of_parts, image_.height);
+    const Samples samples = image_.rows(around.first, around.n);
+    const FeatureRows features(settings_.features, around.first, around.n);
+    MethodSettings settings = settings_;
+    settings.features = features.features;
+    DenoisingParts parts = method_.parts(samples, settings);
+    leave_rows(from - around.first, end - from, parts);
+    return parts;
+  }
+
+  /// Mixes rows `mixed` …, which the band's error needs.
+  void append_mixed(const Rows& mixed, const RowBand& band, MadeRows& rows, MixedRows& whole) const {
+    DenoisingParts& parts = rows.parts;
+    leave_rows(mixed.first - rows.first, mixed.n, parts), leave_rows(mixed.first - rows.first, mixed.n, rows.sets);
+    MixedParts mixture = mix_sets(parts, std::move(rows.sets), rows.makers, method_.weighting, &whole_);
+    const Rows left(band.y - kErrorReach, band.y + band.n + kErrorReach, image_.height);
+    leave_rows(left.first - mixed.first, left.n, parts), leave_rows(left.first - mixed.first, left.n, mixture);
+    const Samples samples = image_.rows(left.first, left.n);
+    const FeatureRows features(settings_.features, left.first, left.n);
+    parts.groups = samples.independent, parts.features = features.features;
+    const int skipped = band.y - left.first;
+    append(mixed_rows(parts, mixture, rows.makers, settings_.std_error), skipped, band.y, band.n, image_.height, whole);
+    whole.result.nonfinite_pixels += unusable(samples, skipped, band.n);
   }
 
   /// The number of samples, and whether there are enough.
@@ -101,18 +204,17 @@ class RowsDenoising {
     network_ = std::make_shared<NetworkImages>(network_images(settings_.features, *method_.network, std::move(noisy)));
   }
 
-  std::vector<CandidateMaker> makers_of(const Band& band) const {
-    std::vector<CandidateMaker> makers = {method_.filters(band.features.features, band.first)};
+  std::vector<CandidateMaker> makers_of(const Features& features, const WantedRows& wanted, int n) const {
+    std::vector<CandidateMaker> makers = {method_.filters(features, wanted)};
     const bool is_mean = method_.base == CandidateBase::kMean;
     if (!network_) {
-      if (is_mean && enough_) add_weighing_maker(band.features.features, makers);
+      if (is_mean && enough_) add_weighing_maker(features, makers);
       return makers;
     }
     const auto rows = std::make_shared<NetworkImages>();
     rows->runs = network_->runs;
     for (size_t i = 0; i < rows->images.size(); ++i)
-      if (!network_->images[i].data.empty())
-        rows->images[i] = rows_of(network_->images[i], band.first, band.rows.independent.height);
+      if (!network_->images[i].data.empty()) rows->images[i] = rows_of(network_->images[i], wanted.first_row, n);
     CandidateMaker network = neural_candidates({}, {}, method_.base, rows);
     makers.insert(is_mean ? makers.begin() : makers.end(), std::move(network));
     return makers;
@@ -121,13 +223,14 @@ class RowsDenoising {
   void find_weights() {
     std::vector<NormalRow> all;
     std::vector<CandidateMaker> makers;
-    const int reach = candidates_reach(method_.base, method_.network.has_value(), method_.reach_of_parts);
     for (const auto& [first, end] : sampled_rows(image_.width, image_.height))
-      for_each_band(reach, first, end, [&](const Band& band, int, int n) {
-        makers = makers_of(band);
-        const std::vector<NormalRow> rows = normal_rows_of(method_.parts(band.rows, band.settings), makers,
-                                                           method_.weighting, band.skipped, band.skipped + n);
-        all.insert(all.end(), rows.begin(), rows.end());
+      for_each_made(of_weighing(), first, end, false, [&](const RowBand& band, MadeRows& rows) {
+        rows.weigh();
+        const int begin = band.y - rows.first;
+        const std::vector<NormalRow> sums =
+            normal_rows_of(rows.parts, std::move(rows.sets), method_.weighting, begin, begin + band.n);
+        all.insert(all.end(), sums.begin(), sums.end());
+        makers = std::move(rows.makers);
       });
     const bool is_mean = method_.base == CandidateBase::kMean;
     whole_.everywhere = weights_of_whole(is_mean, makers, method_.weighting, whole_.samples, all);
@@ -136,20 +239,22 @@ class RowsDenoising {
   MethodImage by_bands_of_few() const {
     MethodImage whole;
     for_each_band(method_.reach_of_parts + kCandidateReach, 0, image_.height, [&](const Band& band, int y, int n) {
-      const MethodImage part = method_.of_few(band.rows, band.settings, makers_of(band));
+      const MethodImage part =
+          method_.of_few(band.rows, band.settings,
+                         makers_of(band.features.features, {.first_row = band.first}, band.rows.independent.height));
       append_rows(part, band.skipped, y, n, image_.height, whole);
       whole.note = part.note;
-      whole.nonfinite_pixels += unusable(band, n);
+      whole.nonfinite_pixels += unusable(band.rows, band.skipped, n);
     });
     whole.network_runs = network_ ? network_->runs : 0;
     return whole;
   }
 
   /// Pixels that are left out, without the surrounding rows, which belong to other bands.
-  static long unusable(const Band& band, int n) {
-    const GroupedImage& crn = band.rows.crn.data ? band.rows.crn : band.rows.independent;
+  static long unusable(const Samples& rows, int skipped, int n) {
+    const GroupedImage& crn = rows.crn.data ? rows.crn : rows.independent;
     long n_unusable = 0;
-    finite_pixels(rows_of(crn, band.skipped, n), rows_of(band.rows.independent, band.skipped, n), n_unusable);
+    finite_pixels(rows_of(crn, skipped, n), rows_of(rows.independent, skipped, n), n_unusable);
     return n_unusable;
   }
 

@@ -2,7 +2,8 @@
 // Denoises images that are too large for memory by bands of rows, with the same bits as at once: bands overlap by the
 // radius of influence, and what rows share follows from passes over all of them. First come the numbers of samples and,
 // with a network, its images, which see the whole picture; then the weights of a sample of rows (mixture.h); then the
-// bands themselves, whose errors are scaled in the end (mixed_rows.h).
+// bands themselves, whose errors are scaled in the end (mixed_rows.h). A band keeps the images of its samples and their
+// candidates for the next one, so that these, the larger part of the work, are made once.
 #pragma once
 
 #include <functional>
@@ -22,7 +23,7 @@ struct RowsMethod {
   CandidateBase base = CandidateBase::kMean;
   int reach_of_parts = 0;  ///< radius of influence of the images on the parts
   std::function<DenoisingParts(const Samples& rows, const MethodSettings& settings)> parts;
-  std::function<CandidateMaker(const Features& features, int first_row)> filters;
+  std::function<CandidateMaker(const Features& features, const WantedRows& wanted)> filters;
   std::optional<DenoiseOptions> network;
   /// The image of rows whose samples are too few for a mixture.
   std::function<MethodImage(const Samples& rows, const MethodSettings& settings,

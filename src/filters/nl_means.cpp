@@ -104,10 +104,10 @@ struct Steering {
 class Filter {
  public:
   Filter(std::span<const NlMeansSteering> steerings, const Planes* features, const std::vector<unsigned char>& valid,
-         int first_row)
+         const WantedRows& wanted)
       : width_(steerings[0].image->width),
         height_(steerings[0].image->height),
-        first_row_(first_row),
+        wanted_(wanted),
         features_(features),
         valid_(valid) {
     COVARY_CHECK(!features_ || features_->border() >= kNlMeansRadius, "features have the border that NL-means reads");
@@ -117,11 +117,12 @@ class Filter {
 
   std::vector<Image> run() {
     // Tiles are those of the whole image, so that the order of its sums does not depend on the rows that are given.
-    const int columns = (width_ + kTileWidth - 1) / kTileWidth, first = first_row_ / kTileHeight;
-    const int rows = (first_row_ + height_ + kTileHeight - 1) / kTileHeight - first;
+    const int first_row = wanted_.first_row, end = first_row + std::min(height_, wanted_.end);
+    const int columns = (width_ + kTileWidth - 1) / kTileWidth, first = (first_row + wanted_.first) / kTileHeight;
+    const int rows = (end + kTileHeight - 1) / kTileHeight - first;
     PerThread<Buffers> buffers;
     parallel_for(columns * rows, [&](int number) {
-      const int x = number % columns * kTileWidth, y = (first + number / columns) * kTileHeight - first_row_;
+      const int x = number % columns * kTileWidth, y = (first + number / columns) * kTileHeight - first_row;
       filter_tile({x, y, std::min(kTileWidth, width_ - x), std::min(kTileHeight, height_ - y)}, buffers.local());
     });
     return std::move(images_);
@@ -183,20 +184,20 @@ class Filter {
 
   [[gnu::noinline]] void filter_tile(const Tile& tile, Buffers& b) {
     const FlushTiny flush;
-    b.weights.resize(n_weights_);
-    copy_tile(tile, b);
+    b.weights.resize(n_weights_), copy_tile(tile, b);
     b.totals.resize(tile.height * kSums * n_totals_ * kRow);
     for (int y = 0; y < tile.height; ++y) add_own(tile, y, b);
     const int max_x = std::min(kNlMeansRadius, width_ - 1), max_y = std::min(kNlMeansRadius, height_ - 1);
-    for (int band = std::max(-kNlMeansRadius, -tile.y - first_row_); band < tile.height; band += kBand)
-      for (int dy = 0; dy <= max_y; ++dy) {
+    for (int band = std::max(-kNlMeansRadius, -tile.y - wanted_.first_row); band < tile.height; band += kBand)
+      for (int dy = 0; dy <= max_y && wanted_.any(tile.y + band, tile.y + band + kBand + max_y); ++dy) {
         const int first = std::max({band, -dy, -tile.y});
         const int end = std::min({band + kBand, tile.height, height_ - tile.y - dy});
         if (first >= end) continue;
         for (int dx = dy == 0 ? 1 : -max_x; dx <= max_x; dx += kAtOnce)
           add_pairs(tile, first, end, {dx, dy, std::min(kAtOnce, max_x + 1 - dx)}, b);
       }
-    for (int y = std::max(0, -tile.y); y < tile.height; ++y) finish(tile, y, totals(b, y));
+    for (int y = std::max({0, -tile.y, wanted_.first - tile.y}); y < std::min(tile.height, wanted_.end - tile.y); ++y)
+      finish(tile, y, totals(b, y));
   }
 
   void copy_tile(const Tile& tile, Buffers& b) const {
@@ -205,8 +206,7 @@ class Filter {
       const Steering& s = steerings_[i];
       Planes& planes = b.planes[i];
       if (planes.count() != s.n_planes()) planes = Planes(kTileWidth, kTileHeight, s.n_planes(), kBorder, 0);
-      COVARY_CHECK(planes.row(1, 0) - planes.row(0, 0) == kPlane && planes.stride() == kStride,
-                   "planes are as assumed");
+      COVARY_CHECK(planes.row(1, 0) - planes.row(0, 0) == kPlane && planes.stride() == kStride, "as assumed");
       copy_around(tile, *s.std_error, true, 3, planes);
       for (size_t k = 0; k < s.sources.size(); ++k)
         copy_around(tile, *s.sources[k].image, false, Steering::first_plane(k), planes);
@@ -380,7 +380,8 @@ class Filter {
     }
   }
 
-  const int width_, height_, first_row_;
+  const int width_, height_;
+  const WantedRows wanted_;
   const Planes* features_;
   const std::vector<unsigned char>& valid_;
   std::vector<Steering> steerings_;
@@ -392,8 +393,8 @@ class Filter {
 }  // namespace
 
 std::vector<Image> nl_means(std::span<const NlMeansSteering> steerings, const Planes* features,
-                            const std::vector<unsigned char>& valid, int first_row) {
-  return Filter(steerings, features, valid, first_row).run();
+                            const std::vector<unsigned char>& valid, const WantedRows& wanted) {
+  return Filter(steerings, features, valid, wanted).run();
 }
 
 }  // namespace covary

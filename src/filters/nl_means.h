@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "filters/planes.h"
+#include "filters/wanted_rows.h"
 
 namespace covary {
 
@@ -39,9 +40,9 @@ inline constexpr int kNlMeansReach = kNlMeansRadius + 1;
 /// distances, and all steerings those of the features, so that further ones cost less. Pixels whose weights are all
 /// zero keep the source's value. All images must have three channels, the same size and finite values. Bit-identical
 /// for any number of threads. `features`: q, any number of planes, border of at least kNlMeansRadius; may be null.
-/// `valid`: pixels with 0 are left out of all sums. `first_row`: of a larger image if these are rows of it; rows at
-/// least kNlMeansReach away from those that are missing have the bits of the whole.
+/// `valid`: pixels with 0 are left out of all sums. Of rows of a larger image, those at least kNlMeansReach away from
+/// those that are missing have the bits of the whole.
 std::vector<Image> nl_means(std::span<const NlMeansSteering> steerings, const Planes* features,
-                            const std::vector<unsigned char>& valid, int first_row = 0);
+                            const std::vector<unsigned char>& valid, const WantedRows& wanted = {});
 
 }  // namespace covary

@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 #include "estimators/test_images.h"
 
@@ -115,6 +116,19 @@ TEST(NlMeans, OfSeveralImagesIsThatOfEach) {
   EXPECT_EQ(images[0].data, p.filtered({{0.5f, {&p.f}}})[0].data);
   EXPECT_EQ(images[1].data, second[0].data);
   EXPECT_EQ(images[2].data, second[1].data);
+}
+
+/// Over several tiles, which begin within the rows that are wanted and around them.
+TEST(NlMeans, OfWantedRowsIsThatOfAll) {
+  const Picture p(30, 200);
+  const NlMeansSteering steering{&p.f, &p.s, {{0.5f, {&p.f}}}};
+  const Image all = p.filtered({{0.5f, {&p.f}}})[0];
+  for (const auto& [first, end] : {std::pair{0, 20}, {70, 71}, {50, 140}, {128, 200}, {200, 200}}) {
+    const Image rows = nl_means({&steering, 1}, &p.features, p.valid, {0, first, end})[0];
+    for (int y = 0; y < 200; ++y)
+      for (int i = 0; i < 3 * 30; ++i)
+        ASSERT_EQ(rows.pixel(0, y)[i], y >= first && y < end ? all.pixel(0, y)[i] : 0) << first << " row " << y;
+  }
 }
 
 TEST(NlMeans, KeepsToValuesOfAnySize) {

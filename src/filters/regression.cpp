@@ -48,12 +48,12 @@ class Regression {
         width_(input.image->width),
         height_(input.image->height),
         columns_((width_ + kStep - 1) / kStep),
-        first_window_(input.first_row / kStep % kBandRows),
+        first_window_(input.wanted.first_row / kStep % kBandRows),
         n_terms_(3),
         n_sources_(static_cast<int>(input.sources.size())) {
     for (const Image* feature : features) n_terms_ += feature->channels;
     COVARY_CHECK(n_terms_ <= 3 + kMaxFeatures, "at most kMaxFeatures");
-    COVARY_CHECK(input.first_row % kRegressionCell == 0, "rows begin with a row of windows");
+    COVARY_CHECK(input.wanted.first_row % kRegressionCell == 0, "rows begin with a row of windows");
     first_of_position_ = n_terms_;
     if (in_.position) n_terms_ += 3;
     std::vector<const Image*> images = {in_.image, in_.std_error};
@@ -76,15 +76,22 @@ class Regression {
     const int end = first_window_ + (height_ + kStep - 1) / kStep;
     std::vector<Planes> bands(static_cast<size_t>((end + kBandRows - 1) / kBandRows));
     parallel_for(static_cast<int>(bands.size()), [&](int number) {
+      const int top = (number * kBandRows - first_window_) * kStep;
+      if (!in_.wanted.any(top - kBorder, top + kBandRows * kStep + kBorder)) return;
       const FlushTiny flush;
       Planes& sums = bands[static_cast<size_t>(number)];
       sums = Planes(columns_, kBandRows * kStep, kStep * (3 * n_sources_ + 1), kBorder, 0);
       const int first = number * kBandRows;
-      for (int row = std::max(first, first_window_); row < std::min(first + kBandRows, end); ++row)
+      for (int row = std::max(first, first_window_); row < std::min(first + kBandRows, end); ++row) {
+        const int y = kStep * (row - first_window_) + 1;
+        if (!in_.wanted.any(y - kRadius, y + kRadius + 1)) continue;
         for (int x = 0; x < columns_; x += kLanes) add_windows(x, row - first_window_, kStep * (row - first) + 1, sums);
+      }
     });
     std::vector<Image> images(static_cast<size_t>(n_sources_), Image(width_, height_, 3));
-    parallel_for(height_, 16, [&](int y) { finish(y, bands, images); });
+    parallel_for(height_, 16, [&](int y) {
+      if (in_.wanted.any(y, y + 1)) finish(y, bands, images);
+    });
     return images;
   }
 

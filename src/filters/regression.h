@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "filters/planes.h"
+#include "filters/wanted_rows.h"
 
 namespace covary {
 
@@ -28,9 +29,9 @@ struct RegressionInput {
   std::vector<const Image*> sources, others;
   const Image* position = nullptr;  ///< of the surfaces, in any unit; or null
   bool coarse = false;              ///< planes around every fourth pixel of every fourth row instead
-  /// Of a larger image if these are rows of it, a multiple of kRegressionCell; rows at least kRegressionReach away from
-  /// those that are missing have the bits of the whole.
-  int first_row = 0;
+  /// Rows of a larger image begin at a multiple of kRegressionCell; those at least kRegressionReach away from those
+  /// that are missing have the bits of the whole.
+  WantedRows wanted = {};
 };
 
 inline constexpr int kRegressionCell = 12;   ///< the windows of both kinds begin anew

@@ -8,6 +8,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "estimators/test_images.h"
 #include "filters/nl_means.h"
@@ -133,6 +134,22 @@ TEST(Regression, KeepsTextureThatFeaturesOrPositionsShow) {
   const Image by_position = covary::regressed({&p.f, &p.s, {&p.f}, {&p.other}, &p.position}, {}, p.valid)[0];
   EXPECT_LT(error(by_position), 0.5 * error(p.other));
   EXPECT_LT(error(by_position), 0.5 * error(p.f));
+}
+
+TEST(Regression, OfWantedRowsIsThatOfAll) {
+  const FittedPicture p(30, 100);
+  const Image* const features[] = {&p.feature};
+  for (const bool coarse : {false, true}) {
+    RegressionInput input{&p.f, &p.s, {&p.f}, {&p.other}, nullptr, coarse};
+    const Image all = covary::regressed(input, features, p.valid)[0];
+    for (const auto& [first, end] : {std::pair{0, 10}, {37, 38}, {20, 90}, {75, 100}, {100, 100}}) {
+      input.wanted = {0, first, end};
+      const Image rows = covary::regressed(input, features, p.valid)[0];
+      for (int y = 0; y < 100; ++y)
+        for (int i = 0; i < 3 * 30; ++i)
+          ASSERT_EQ(rows.pixel(0, y)[i], y >= first && y < end ? all.pixel(0, y)[i] : 0) << first << " row " << y;
+    }
+  }
 }
 
 TEST(Regression, OfPartsAddsUpToThatOfTheWhole) {
