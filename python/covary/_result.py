@@ -31,11 +31,13 @@ def new_axes() -> Any:
     return pyplot.subplots(layout="constrained")[1]
 
 
-def relmse_text(value: float | None, bounds: tuple[float, float] | None) -> str:
-    """A predicted relMSE with its 80 % interval; "" if it is unknown."""
+def relmse_text(value: float | None, bounds: tuple[float, float] | None, doubt: str) -> str:
+    """A predicted relMSE with its 80 % interval, and whether it is in doubt; "" if it is unknown."""
     if value is None:
         return ""
-    return f"predicted relMSE {value:.3g}" + (f" ({bounds[0]:.2g} to {bounds[1]:.2g})" if bounds else "")
+    notes = [f"{bounds[0]:.2g} to {bounds[1]:.2g}"] if bounds else []
+    notes += ["unsure"] if doubt else []
+    return f"predicted relMSE {value:.3g}" + (f" ({'; '.join(notes)})" if notes else "")
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -114,7 +116,7 @@ class Result:
         height, width = self.image.shape[:2]
         samples = "" if self.samples_per_pixel is None else f"{self.samples_per_pixel:g} samples per pixel"
         facts = [f"{width} x {height}", samples, self.estimator,
-                 relmse_text(self.predicted_relmse, self.predicted_bounds),
+                 relmse_text(self.predicted_relmse, self.predicted_bounds, self.prediction_doubt),
                  f"{len(self.warnings)} warning{'s' if len(self.warnings) > 1 else ''}" if self.warnings else ""]
         return f"<covary.{type(self).__name__} {', '.join(fact for fact in facts if fact)}>"
 
@@ -137,7 +139,8 @@ class Result:
         shown = numpy.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
         axes.imshow(shown)
         axes.set_axis_off()
-        axes.set_title(relmse_text(self.predicted_relmse, self.predicted_bounds) or self.estimator)
+        axes.set_title(relmse_text(self.predicted_relmse, self.predicted_bounds, self.prediction_doubt)
+                       or self.estimator)
         return axes
 
 

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstring>
 #include <exception>
 #include <fstream>
 #include <iterator>
@@ -118,6 +119,8 @@ class OiioModule final : public ImageModule {
         problem = one_line(OIIO::geterror());
       } else if (input->spec().depth > 1 || input->spec().deep) {
         problem = input->spec().deep ? "it has deep pixels" : "it is a volume, not a picture";
+      } else if (std::strcmp(input->format_name(), "FFmpeg movie") == 0) {  // whose reader writes past narrow frames
+        problem = "it is a video; give its frames, e.g. of `ffmpeg -i VIDEO frame_%04d.png`";
       } else {
         return std::make_unique<OiioReader>(path, std::move(input));
       }

@@ -197,7 +197,7 @@ TEST_F(LoadScene, MakesEveryShape) {
   EXPECT_EQ(s.scene->n_shapes(), 7u);
   EXPECT_EQ(s.scene->n_triangles(), 1u + 1 + 2 + 12);
   ASSERT_EQ(s.warnings.size(), 1u);
-  EXPECT_TRUE(contains(s.warnings[0], "1 triangles of zero area in 1 meshes were left out, the first in "));
+  EXPECT_TRUE(contains(s.warnings[0], "left out 1 triangle of zero area in 1 mesh, the first in "));
   EXPECT_TRUE(contains(s.warnings[0], "scene.xml:5:"));
   ASSERT_TRUE(hits(s, {0.1f, 0.1f, 20}, {0, 0, -1}));
   EXPECT_NEAR(hit_.p.z, 9 + std::sqrt(4 - 0.02f), 1e-4f);

@@ -7,6 +7,8 @@
 #include <array>
 #include <filesystem>
 
+#include "core/error.h"
+#include "core/known_names.h"
 #include "core/number_text.h"
 #include "formats/object_builder.h"
 #include "gltf/gltf_reader.h"
@@ -252,6 +254,10 @@ Surroundings surroundings(const SceneView& view, const SceneParts& parts, const 
     result.objects.push_back(make_object("emitter", "constant", where, {{"radiance", 1.0}}));
   } else {
     const std::string path = std::filesystem::absolute(kind).string();
+    if (std::error_code ignored; !std::filesystem::exists(path, ignored))
+      throw Error(ErrorCode::kInput, fmt::format("`environment` '{}': there is no such file", kind) +
+                                         hint_and_list(kind, {"studio", "sky", "white", "none"},
+                                                       "expected a file, studio, sky, white or none"));
     result.objects.push_back(
         make_object("emitter", "envmap", where, {{"filename", path}, {"to_world", turned(up, orientation.front)}}));
   }

@@ -222,7 +222,7 @@ class Experiment {
     try {
       references = read_references(scene.reference.files, scene.scene);
       check_seeds(scene);
-      if (references_[s].empty()) warn_of_given_references(s);
+      warn_of_given_images(s);
     } catch (const std::exception& error) {
       fail({scene.scene.entry.name, "reference", "", "", error.what(), 1, 0});
       return;
@@ -263,8 +263,8 @@ class Experiment {
     return text;
   }
 
-  /// For references given as files: warns if their attributes make errors against them doubtful.
-  void warn_of_given_references(size_t s) {
+  /// Warns if attributes of references, or of a method's images, that were given make errors doubtful.
+  void warn_of_given_images(size_t s) {
     const SceneResult& scene = results_.scenes[s];
     std::vector<ImageFacts> references;
     const std::vector<int>& frames = scene.scene.frames;
@@ -275,10 +275,12 @@ class Experiment {
       for (const std::string& text : comparison_warnings(image, reference))
         found.push_back(scene.scene.entry.name + ": " + text);
     };
-    if (references.size() == 2) add(references[0], references[1]);
+    if (references_[s].empty() && references.size() == 2) add(references[0], references[1]);
     std::set<size_t> seen;  // methods: all runs of one have the same warnings
     for (const Run& run : runs_[s])
-      if (const auto record = records_.find(run.key); record != records_.end() && seen.insert(run.method).second)
+      if (const auto record = records_.find(run.key);
+          record != records_.end() && (references_[s].empty() || !results_.suite.methods[run.method].renders) &&
+          seen.insert(run.method).second)
         for (const ImageFacts& reference : references)
           add(read_facts(files_of(frames, record->second.image).front(),
                          "renders of " + results_.suite.methods[run.method].name),

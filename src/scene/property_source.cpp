@@ -47,8 +47,9 @@ std::optional<std::string> text_of(Parameters& parameters, const Property& prope
 std::optional<std::string> PropertySource::find(const Option& option) {
   const std::string name = underscored(option.name);
   std::optional<std::string> text;
+  const bool has_it = parameters_.has(name);  // from now on a known name, for messages
   for (const Property& property : parameters_.object().properties) {
-    if (property.name != name || !parameters_.has(name)) continue;
+    if (property.name != name || !has_it) continue;
     text = text_of(parameters_, property, option);
     if (!text) parameters_.error_at(property.name, "must be " + wanted(option));
   }

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is made of numbered images of any renderer: comparisons and videos."""
+import base64
 import json
 import os
 import subprocess
@@ -73,6 +74,21 @@ test ! -e fail
 """
 
 
+# One red frame of 120 x 80 pixels, MPEG-4 with H.264.
+MOVIE = base64.b64decode(
+    "AAAAIGZ0eXBpc29tAAACAGlzb21pc28yYXZjMW1wNDEAAAAIZnJlZQAAAD5tZGF0AAAAMmWIhDoRigACGPHAAED2OAAIeUnJycnJycnXXXXXXX"
+    "XXXXXXXXXXXXXXXXXXXXXXXXXgAAAC621vb3YAAABsbXZoZAAAAAAAAAAAAAAAAAAAA+gAAAPoAAEAAAEAAAAAAAAAAAAAAAABAAAAAAAAAAAA"
+    "AAAAAAAAAQAAAAAAAAAAAAAAAAAAQAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAIAAAI6dHJhawAAAFx0a2hkAAAAAwAAAAAAAAAAAA"
+    "AAAQAAAAAAAAPoAAAAAAAAAAAAAAAAAAAAAAABAAAAAAAAAAAAAAAAAAAAAQAAAAAAAAAAAAAAAAAAQAAAAAB4AAAAUAAAAAAAJGVkdHMAAAAc"
+    "ZWxzdAAAAAAAAAABAAAD6AAAAAAAAQAAAAABsm1kaWEAAAAgbWRoZAAAAAAAAAAAAAAAAAAAQAAAAEAAVcQAAAAAAC1oZGxyAAAAAAAAAAB2aW"
+    "RlAAAAAAAAAAAAAAAAVmlkZW9IYW5kbGVyAAAAAV1taW5mAAAAFHZtaGQAAAABAAAAAAAAAAAAAAAkZGluZgAAABxkcmVmAAAAAAAAAAEAAAAM"
+    "dXJsIAAAAAEAAAEdc3RibAAAALlzdHNkAAAAAAAAAAEAAACpYXZjMQAAAAAAAAABAAAAAAAAAAAAAAAAAAAAAAB4AFAASAAAAEgAAAAAAAAAAQ"
+    "xMYXZjIGxpYngyNjQAAAAAAAAAAAAAAAAAAAAAAAAAABj//wAAAC9hdmNDAULACv/hABhnQsAK2ggvl8BEAAADAAQAAAMACDxImoABAARozg/I"
+    "AAAAEHBhc3AAAAABAAAAAQAAABRidHJ0AAAAAAAAAbAAAAAAAAAAGHN0dHMAAAAAAAAAAQAAAAEAAEAAAAAAHHN0c2MAAAAAAAAAAQAAAAEAAA"
+    "ABAAAAAQAAABRzdHN6AAAAAAAAADYAAAABAAAAFHN0Y28AAAAAAAAAAQAAADAAAAA9dWR0YQAAADVtZXRhAAAAAAAAACFoZGxyAAAAAAAAAABt"
+    "ZGlyYXBwbAAAAAAAAAAAAAAAAAhpbHN0")
+
+
 class Video(CliTest):
     def setUp(self):
         super().setUp()
@@ -86,6 +102,14 @@ class Video(CliTest):
     def convert(self, *arguments):
         return subprocess.run([COVARY, "convert", *arguments], cwd=self.path, env=self.environment, capture_output=True,
                               text=True)
+
+    def test_videos_are_no_images(self):
+        """OpenImageIO's reader of them writes past the memory of frames of this width."""
+        self.write("movie.mp4", MOVIE)
+        for command in (("convert", "movie.mp4", "a.png"), ("info", "movie.mp4"),
+                        ("view", "movie.mp4", "-o", "a.html")):
+            self.bad(1, "movie.mp4: not an image that can be read", *command)
+        self.bad(1, "movie.mp4: not an image that can be read", "compare", "f_01.exr", "-r", "movie.mp4")
 
     def test_frames_go_to_ffmpeg_in_their_order(self):
         result = self.convert("f_##.exr", "v.mp4", "--fps", "12")

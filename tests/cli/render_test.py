@@ -348,6 +348,14 @@ class Files(RenderTest):
         self.bad(2, "-o '/dev/null' is not a regular file", *self.RENDER, "-o", "/dev/null")
         self.write("file", b"")
 
+    def test_parameters_of_integrators_have_hints(self):
+        for given, right in (("max_dept", "max_depth"), ("rr_dept", "rr_depth")):
+            (self.path / "slip.xml").write_text(
+                f'<scene version="3.0.0"><integrator type="path"><integer name="{given}" value="6"/></integrator>'
+                "</scene>")
+            self.bad(1, f"unknown parameter '{given}' of integrator 'path'; did you mean '{right}'", "render",
+                     "slip.xml", "-o", "a.exr")
+
     def test_small_scenes_have_names(self):
         hashes = [json.loads(self.good("info", image, "--json").stdout)["attributes"]["covary:scene_hash"]
                   for image, scene in (("name.exr", "room"), ("file.exr", ROOM))

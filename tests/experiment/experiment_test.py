@@ -457,6 +457,20 @@ class Programs(ExperimentTest):
         self.bad(2, "--renderer 'mine' is the name of a --program, too", "--program", "mine=true", "--renderer",
                  "mine=true")
 
+    def test_given_images_of_another_filter_are_told(self):
+        """They would seem worse than what the experiment renders."""
+        for seed in ("1", "2"):
+            self.run_covary([COVARY, "render", str(SCENES / "room.xml"), "--resolution", "32x24", "--spp", "16",
+                             "--seed", seed, "--rfilter", "gaussian", "--estimator", "none", "--no-preview", "-o",
+                             str(self.path / f"given-{seed}.exr")])
+        self.suite["methods"][-1] = {"name": "copy", "options": [], "program": "mine", "renders": False}
+        warnings = self.results("--renderer", f'mine=cp {self.path}/given-$COVARY_SEED.exr "$COVARY_OUTPUT"; '
+                                              'echo seconds 1')["warnings"]
+        told = [text for text in warnings if "pixel filters" in text]
+        self.assertTrue(told, warnings)
+        self.assertIn("room: renders of copy and ", told[0])
+        self.assertIn("were rendered with different pixel filters: 'gaussian", told[0])
+
     def test_a_program_that_waits_is_told(self):
         """It takes a thousand seconds by the clock, and hardly any of the processor."""
         results = self.results("--program", 'mine=cp "$COVARY_IMAGE" "$COVARY_OUTPUT"; echo seconds 1000; '

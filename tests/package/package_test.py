@@ -97,7 +97,7 @@ class Package(unittest.TestCase):
 
     def test_combining_arrays_reports_errors(self):
         (self.work / "short").write_bytes(b"1234")
-        with self.assertRaisesRegex(AssertionError, "combine_arrays: short: less than 108 floats"):
+        with self.assertRaisesRegex(AssertionError, "combine_arrays: short: not 108 floats"):
             self.run_in_folder(self.examples / "combine_arrays", 3, 3, 4, "short", "short", "out")
         for given, message in (((-6, 3, 4), "WIDTH '-6': expected a whole number from 1 on"),
                                ((3, 3, "x4"), "GROUPS 'x4': expected a whole number from 1 on")):
@@ -111,14 +111,14 @@ class Package(unittest.TestCase):
                            "--estimator", "iicv", "--passes", "pair")
         films = ("pair/independent.exr", "--crn", "pair/crn.exr")
         printed = self.run_in_folder(self.examples / "combine_files", "own.exr", *films)
-        self.assertRegex(printed, rf"^{GROUPS} \+ {GROUPS} groups, predicted relMSE 0\.\d+\n$")
+        self.assertRegex(printed, rf"^{GROUPS} \+ {GROUPS} groups, predicted relMSE 0\.\d+( \(unsure\))?\n$")
         self.run_in_folder(covary, "combine", "--independent", *films, "--error", "-o", "program.exr", "--quiet")
         self.assertEqual(rgb(self.work / "own.exr"), rgb(self.work / "program.exr"))
         for seed in (1, 2):
             self.run_in_folder(covary, "render", ROOM, "-o", f"{seed}.exr", *small, "--spp", 8, "--seed", seed,
                                "--estimator", "none")
         printed = self.run_in_folder(self.examples / "combine_files", "own.exr", "1.exr", "2.exr")
-        self.assertRegex(printed, r"^0 \+ 2 groups, predicted relMSE 0\.\d+\n$")
+        self.assertRegex(printed, r"^0 \+ 2 groups, predicted relMSE 0\.\d+( \(unsure\))?\n$")
         self.run_in_folder(covary, "denoise", "1.exr", "2.exr", "-o", "denoised.exr", "--quiet")
         self.assertEqual(rgb(self.work / "own.exr"), rgb(self.work / "denoised.exr"))
         with self.assertRaisesRegex(AssertionError, r"combine_files: .*none\.exr"):

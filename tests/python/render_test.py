@@ -94,7 +94,7 @@ class Render(PackageTest):
         self.assertEqual(*(covary.Scene.load(file).content_hash for file in ("room", covary.scenes.path("room"))))
         result = covary.render(scene, 4, "none", groups=2)
         self.assertRegex(repr(result), r"^<covary\.RenderResult 36 x 24, 4 samples per pixel, none, predicted relMSE "
-                                       r"[0-9.]+( \([0-9.]+ to [0-9.]+\))?>$")
+                                       r"[0-9.]+( \(([0-9.]+ to [0-9.]+|unsure|[0-9.]+ to [0-9.]+; unsure)\))?>$")
         without_pixels = dataclasses.replace(result, image=numpy.zeros((0, 0, 3), numpy.float32))
         self.assertIn("&lt;covary.RenderResult", without_pixels._repr_html_())
         self.assertIn("<iframe", result._repr_html_())

@@ -28,8 +28,9 @@ int number_of(const char* name, const std::string& word) {
 std::vector<float> read_floats(const char* path, size_t count) {
   std::vector<float> values(count);
   std::ifstream file(path, std::ios::binary);
-  if (!file.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(count * sizeof(float))))
-    throw covary::Error(covary::ErrorCode::kIo, std::string(path) + ": less than " + std::to_string(count) + " floats");
+  if (!file.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(count * sizeof(float))) ||
+      file.peek() != std::ifstream::traits_type::eof())
+    throw covary::Error(covary::ErrorCode::kIo, std::string(path) + ": not " + std::to_string(count) + " floats");
   return values;
 }
 

@@ -42,8 +42,11 @@ int main(int argc, char** argv) try {
        covary::write_result(words[0], request.independent.origin.place, {{"covary:estimator", request.estimator.text}},
                             combined.image, combined.layers, independent.source()))
     std::fprintf(stderr, "%s\n", lost.c_str());
-  std::printf("%d + %d groups, predicted relMSE %.3g\n", crn ? crn->groups() : 0, independent.groups(),
-              combined.predicted ? combined.predicted->relmse : 0.0);
+  std::printf("%d + %d groups", crn ? crn->groups() : 0, independent.groups());
+  if (combined.predicted)
+    std::printf(", predicted relMSE %.3g%s", combined.predicted->relmse,
+                combined.predicted->doubt.empty() ? "" : " (unsure)");
+  std::printf("\n");
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "combine_files: %s\n", error.what());
