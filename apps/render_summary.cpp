@@ -49,7 +49,9 @@ std::string samples_text(const RenderResult& result) {
   for (const Pass& pass : camera_passes(result.passes))
     passes += fmt::format("{}{:g} {}", passes.empty() ? " (" : " + ", pass.film.mean_count(), pass.plan.name);
   const bool several = camera_passes(result.passes).size() > 1;
-  std::string text = fmt::format("{:.6g} samples per pixel{}", result.samples_per_pixel(), several ? passes + ")" : "");
+  const double samples = result.samples_per_pixel();
+  std::string text =
+      fmt::format("{:.6g} {} per pixel{}", samples, samples == 1 ? "sample" : "samples", several ? passes + ")" : "");
   if (const Pass* light = light_pass(result.passes))
     text += fmt::format(" + {} light paths", format_count(static_cast<double>(light_paths(light->film))));
   return text;

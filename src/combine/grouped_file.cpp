@@ -23,6 +23,10 @@ constexpr const char* kGroup = "group";                  // layers group00, grou
 constexpr const char* kCounts = "samples";               // channel in covary's films
 constexpr const char* kVariance = "variance_in_groups";  // channels .R .G .B in some of them
 
+bool is_same_frame(const ImagePlace& a, const ImagePlace& b) {
+  return a.frame_width == b.frame_width && a.frame_height == b.frame_height;
+}
+
 std::string attribute(const ExrFile& file, const std::string& key) {
   const auto it = file.attributes().find(key);
   return it == file.attributes().end() ? "" : it->second;
@@ -126,10 +130,13 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
     fail_input(
         path,
         fmt::format("{} x {} pixels at ({}, {}) of a frame of {} x {}; {} has {} x {} at ({}, {}) of {} x {}; "
-                    "render both with the same size and crop, without automatic cropping",
+                    "render both with the same size and crop, without automatic cropping{}",
                     file.place().window.width, file.place().window.height, file.place().window.x, file.place().window.y,
                     file.place().frame_width, file.place().frame_height, source_.files[0], place_.window.width,
-                    place_.window.height, place_.window.x, place_.window.y, place_.frame_width, place_.frame_height));
+                    place_.window.height, place_.window.x, place_.window.y, place_.frame_width, place_.frame_height,
+                    is_same_frame(file.place(), place_)
+                        ? ", or fill each to its frame: `oiiotool IN.exr --croptofull -o OUT.exr`"
+                        : ""));
 
   const std::vector<ColourLayer> layers = colour_layers(file.channels());
   const std::vector<ColourLayer> numbered = numbered_layers(layers, layer);

@@ -3,6 +3,7 @@
 that a farm writes slowly; headers that are damaged."""
 import os
 import random
+import re
 import shlex
 import shutil
 import signal
@@ -244,6 +245,22 @@ class Recipes(CliTest):
         expected = [float(e / (g + 0.01) > 0.1) for e, g in zip(out["StdError.G"], out["G"])]
         self.assertGreater(sum(m == e for m, e in zip(grain["Y"], expected)), 0.98 * n)
         self.assertGreater(len(set(expected)), 0)
+
+
+    @unittest.skipUnless(shutil.which("oiiotool"), "OpenImageIO's oiiotool is not installed")
+    def test_data_windows_that_differ_are_filled_as_the_message_says(self):
+        for render, window in (("a", "12x10+1+1"), ("b", "11x10+2+1")):
+            self.write(f"{render}.exr", noisy(render))
+            subprocess.run(["oiiotool", f"{render}.exr", "--crop", window, "-o", f"{render}.part.exr"], cwd=self.path,
+                           check=True)
+        parts = ("denoise", "a.part.exr", "b.part.exr", "-o", "o.exr", "--oidn", "off")
+        said = self.bad(1, "or fill each to its frame: `oiiotool IN.exr --croptofull -o OUT.exr`", *parts).stderr
+        advice = re.search("`(oiiotool .*)`", said)[1]
+        for render in "ab":
+            words = advice.replace("IN.exr", f"{render}.part.exr").replace("OUT.exr", f"{render}.full.exr").split()
+            subprocess.run(words, cwd=self.path, check=True)
+        self.good("denoise", "a.full.exr", "b.full.exr", "-o", "o.exr", "--oidn", "off")
+        self.assertEqual(len(read_exr((self.path / "o.exr").read_bytes())["R"]), SIZE[0] * SIZE[1])
 
 
 class Headers(CliTest):
