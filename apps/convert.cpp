@@ -301,13 +301,13 @@ void convert_frames(const ConvertOptions& options) {
 void convert(const ConvertOptions& options) {
   if (options.files.size() < 2) throw Error(ErrorCode::kUsage, "convert needs an image to read and one to write");
   if (is_video_name(options.files.back())) return convert_to_video(options);
+  if (options.rate) throw Error(ErrorCode::kUsage, "--fps is an option of videos (.mp4, .mkv, .mov, .webm)");
   if (names_frames(options.files.back())) return convert_frames(options);
   if (const auto frames = std::find_if(options.files.begin(), options.files.end(), names_frames);
       frames != options.files.end())
     throw Error(ErrorCode::kUsage, fmt::format("'{}' are frames: expected an output with a '#', too, or a video "
                                                "(.mp4, .mkv, .mov, .webm)",
                                                *frames));
-  if (options.rate) throw Error(ErrorCode::kUsage, "--fps is an option of videos (.mp4, .mkv, .mov, .webm)");
   convert_one(options);
   if (!std::filesystem::is_regular_file(options.files.back())) return;  // such as /dev/stdout
   const ImagePlace place = inspect_image(options.files.back()).place;

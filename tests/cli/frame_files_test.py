@@ -103,6 +103,9 @@ class Video(CliTest):
         return subprocess.run([COVARY, "convert", *arguments], cwd=self.path, env=self.environment, capture_output=True,
                               text=True)
 
+    def test_frames_have_no_rate(self):
+        self.assertIn("--fps is an option of videos", self.convert("f_##.exr", "p_##.png", "--fps", "12").stderr)
+
     def test_videos_are_no_images(self):
         """OpenImageIO's reader of them writes past the memory of frames of this width."""
         self.write("movie.mp4", MOVIE)
