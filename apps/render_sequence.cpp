@@ -220,6 +220,15 @@ class SequenceRender {
     if (!again) warn_of_scene(options, *scene_);
   }
 
+  void warn_of(const Transform& camera) const {
+    if (camera.flips_handedness() != own_camera_.flips_handedness())
+      fmt::print(stderr, "warning: {}: its cameras mirror the picture; x points to the left\n",
+                 options_.sequence.camera_path);
+    if (options_.sequence.history && frames_.size() == 1 && !options_.quiet)
+      fmt::print(stderr, "note: the first frame of a command has no history, and --frames {} has no other\n",
+                 frames_.front());
+  }
+
   void render_frame(size_t index, const StopFlag& stop) {
     const int frame = frames_[index];
     RenderOptions one = frame_options(options_, frame);
@@ -230,6 +239,7 @@ class SequenceRender {
     const bool follows = frame - 1 == last_frame_;  // the previous frame is unknown otherwise
     const Transform now = times_.camera(*scene_, frame).value_or(own_camera_);
     const Transform before = times_.camera(*scene_, frame - 1).value_or(follows ? last_camera_ : now);
+    if (index == 0) warn_of(now);
     times_.place(frame, now, *scene_);
     const std::string made_of = frame_made_of(one, *scene_, now, before, follows ? last_made_of_ : "");
     last_frame_ = frame, last_made_of_ = made_of, last_camera_ = now;

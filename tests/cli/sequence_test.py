@@ -245,6 +245,22 @@ RESTING = re.sub(r'<animation name="to_world">.*time="2">(.*)</animation>',
                  r'<transform name="to_world">\1', ANIMATED, flags=re.DOTALL)
 
 
+class Told(SequenceTest):
+    def test_cameras_that_mirror(self):
+        mirrored = [[-row[0], *row[1:]] for row in START]
+        for start, told in ((START, False), (mirrored, True)):
+            self.write_path((1, start), (4, start))
+            said = self.good_render("-o", "m_#.exr", "--overwrite", frames="1").stderr
+            self.assertEqual("warning: path.json: its cameras mirror the picture; x points to the left" in said, told)
+
+    def test_one_frame_has_no_history(self):
+        words = ("render", "room.xml", "--camera-path", "path.json", "--no-preview", "--resolution", "32x24", "--spp",
+                 "4", "--oidn", "off", "--history", "on", "-o", "h_#.exr", "--frames")
+        note = "note: the first frame of a command has no history, and --frames 2 has no other\n"
+        self.assertIn(note, self.good(*words, "2").stderr)
+        self.assertNotIn("has no history", self.good(*words, "1-2", "--overwrite").stderr)
+
+
 class Animation(SequenceTest):
     """Shapes and a camera that move by the scene's <animation>."""
 
