@@ -263,7 +263,8 @@ def experiment(suite: str | PathLike[str] | dict[str, Any], output: str | PathLi
         such a value cannot be told from others, it is computed again each time, with a warning. Files that it reads,
         and versions of libraries that do not state one, do not count.
     renderers: the same for functions that make the image of the scene themselves, or have it: covary renders nothing
-        for them, and their Samples have no image.
+        for them, and their Samples have no image. References have the box filter, or that of the suite's
+        common_options, so that these images need it, too.
     scenes: folder of the suite's scenes; for a dictionary, by default the current folder.
     options: further words of the program, such as ["--quick"] or ["--spp", "16,64"].
     progress: True for a line of text, the default on a terminal and in notebooks; False for none; or a function, called

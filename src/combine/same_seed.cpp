@@ -18,8 +18,9 @@ constexpr long kMaxSquares = 4000000;
 /// Smallest D, over the square's brightness, that counts as a difference between neighbours: smooth parts and rounding
 /// to 16 bits are below it.
 constexpr float kMinDetail = 0.01f;
-/// D of two groups is the same if it differs by no more than this. Different seeds would need a million samples per
-/// pixel for that; sums in another order differ by 1e-5.
+/// D of two groups is the same if it differs by no more than this, relative to it or, because of rounding to 16 bits,
+/// to the square's brightness. Different seeds would need a million samples per pixel for that; sums in another order
+/// differ by 1e-5.
 constexpr float kSame = 1e-3f;
 /// Squares with a difference between neighbours that are needed as evidence, and their part of those that are not flat:
 /// noise is everywhere, edges are not.
@@ -28,14 +29,14 @@ constexpr double kMinPart = 0.25;
 /// The fraction of them that may differ between groups of one seed: rounding sends a few paths elsewhere.
 constexpr double kMaxDifferent = 0.05;
 
-/// D of the square whose corner is (x, y), in group t. Sets `varied` if it is not exactly 0.
+/// D of the square whose corner is (x, y), in group t, over its brightness. Sets `varied` if it is not exactly 0.
 float detail(const GroupedImage& image, int x, int y, int t, bool& varied) {
   std::array<float, 4> g;
   for (int i = 0; i < 4; ++i) g[i] = grey(image.pixel(x + i % 2, y + i / 2) + 3 * t);
   const float d = g[0] - g[1] - g[2] + g[3];
   varied = std::isfinite(d) && d != 0;
   const float brightest = std::max({std::abs(g[0]), std::abs(g[1]), std::abs(g[2]), std::abs(g[3])});
-  return varied && std::abs(d) > kMinDetail * brightest ? d : 0;
+  return varied && std::abs(d) > kMinDetail * brightest ? d / brightest : 0;
 }
 
 /// How the details of two groups compare.
@@ -53,7 +54,7 @@ Likeness compare(const std::vector<float>& a, const std::vector<float>& b) {
   for (size_t i = 0; i < a.size(); ++i) {
     const float size = std::max(std::abs(a[i]), std::abs(b[i])), difference = std::abs(a[i] - b[i]);
     likeness.squares += size > 0;
-    likeness.differ += difference > kSame * size;
+    likeness.differ += difference > kSame * std::max(size, 1.0f);
     likeness.identical &= difference == 0;
   }
   return likeness;

@@ -63,6 +63,10 @@ TEST(SameSeed, OneSeedIsFound) {
   EXPECT_EQ(findings(rounded), findings(rounded, 16)) << "in bands";
 }
 
+TEST(SameSeed, OneSeedIsFoundBesideItselfInHalfFloats) {
+  EXPECT_NE(findings(repeated(good(2), 1, 1e-3f, 0)), "") << "relative errors of up to 2^-11";
+}
+
 TEST(SameSeed, FoundBesideABadValueAndABlackHalf) {
   test::Grouped image = repeated(good(3), 2, 1e-5f, 0);
   image.pixel(4, 4)[0] = std::numeric_limits<float>::infinity();

@@ -17,6 +17,10 @@ namespace {
 Image read_one(const std::string& path, const SceneInstance& scene, const std::string& layer) {
   const PlacedImage source = read_image(path, layer.empty() ? scene.entry.layer : layer);
   const CropWindow &have = source.place.window, &want = scene.window;
+  // The crop as an image of its own, as one's own methods make it.
+  const CropWindow own{0, 0, want.width, want.height};
+  if (have == own && source.place.frame_width == want.width && source.place.frame_height == want.height)
+    return cut(source, own);
   if (source.place.frame_width != scene.frame_width || source.place.frame_height != scene.frame_height)
     throw Error(ErrorCode::kInput, fmt::format("{} has a frame of {} x {} pixels, the scene one of {} x {}", path,
                                                source.place.frame_width, source.place.frame_height, scene.frame_width,

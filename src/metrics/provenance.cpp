@@ -142,6 +142,13 @@ std::vector<std::string> reference_warnings(const ImageFacts& image, const Image
         fmt::format("{} has {:g} samples per pixel, no more than {} with {:g}: its noise counts as error",
                     reference.name, of_reference, image.name, samples));
   const double error = predicted_of(image), of_itself = predicted_of(reference);
+  // A denoised image may have the error of a hundred times as many samples.
+  const bool is_denoised = !denoised_by(image.info.attributes, image.info.channels).empty();
+  if (warnings.empty() && of_itself == 0 && is_denoised && of_reference > 0 && of_reference < 100 * samples)
+    warnings.push_back(
+        fmt::format("{} has an unknown error of its own, which is counted as {}'s, and {} is denoised: "
+                    "two references would cancel it",
+                    reference.name, image.name, image.name));
   if (warnings.empty() && of_itself > kMaxOfItself * error && error > 0)
     warnings.push_back(
         fmt::format("{} has an error of its own, predicted relMSE {:.2g} beside {:.2g} of {}, which is counted as "

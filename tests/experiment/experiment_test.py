@@ -457,6 +457,13 @@ class Programs(ExperimentTest):
         self.bad(2, "--renderer 'mine' is the name of a --program, too", "--program", "mine=true", "--renderer",
                  "mine=true")
 
+    def test_the_image_of_a_crop_may_be_an_image_of_its_own(self):
+        self.suite["scenes"][0]["crop"] = "5,3,16,12"
+        cells = {c["method"]: c for c in self.results(
+            "--program", f'mine={COVARY} convert "$COVARY_IMAGE" whole.pfm --overwrite && {COVARY} convert whole.pfm '
+                         '"$COVARY_OUTPUT" --overwrite')["cells"]}
+        self.assertAlmostEqual(cells["copy"]["relmse"]["value"], cells["pt"]["relmse"]["value"], 6)
+
     def test_given_images_of_another_filter_are_told(self):
         """They would seem worse than what the experiment renders."""
         for seed in ("1", "2"):

@@ -91,7 +91,7 @@ class Package(unittest.TestCase):
         for name in ("crn", "independent"):
             write_groups(self.work / "passes" / f"{name}.exr", self.work / name)
         printed = self.run_in_folder(self.examples / "combine_arrays", 48, 32, GROUPS, "crn", "independent", "out")
-        self.assertRegex(printed, r"^predicted relMSE 0\.\d+\n$")
+        self.assertRegex(printed, r"^relMSE by the standard errors 0\.\d+\n$")
         values = array.array("f", (self.work / "out").read_bytes())
         self.assertEqual(rgb(self.work / "out.exr"), [list(values[c::3]) for c in range(3)])
 

@@ -47,7 +47,7 @@ int main(int argc, char** argv) try {
   options.std_error = true;
   const covary::EstimatorResult result = covary::iicv(crn, independent, options);
 
-  std::printf("predicted relMSE %.3g\n", covary::predicted_relmse(result));
+  std::printf("relMSE by the standard errors %.3g\n", covary::predicted_relmse(result));
   const std::vector<float>& image = result.estimate.data;
   std::ofstream out(argv[6], std::ios::binary);
   out.write(reinterpret_cast<const char*>(image.data()), static_cast<std::streamsize>(image.size() * sizeof(float)));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Renders a scene (Mitsuba XML) by IICV.
+// Renders a scene (Mitsuba XML) by the default, which denoises.
 //
 //     render_scene SCENE.xml OUT.exr
 #include <covary/combine/registry.h>
