@@ -16,7 +16,7 @@ void append(const std::vector<std::string>& more, std::vector<std::string>& all)
 
 std::vector<std::vector<std::string>> warn_of_comparison(const std::vector<std::string>& images,
                                                          const std::vector<std::string>& references,
-                                                         std::set<std::string>& printed) {
+                                                         std::set<std::string>& printed, bool may_have_two) {
   std::vector<ImageFacts> facts;
   std::vector<std::string> of_references;
   for (const std::string& path : references) {
@@ -30,7 +30,7 @@ std::vector<std::vector<std::string>> warn_of_comparison(const std::vector<std::
     std::vector<std::string>& found = result.emplace_back(of_references);
     append(image_warnings(image), found);
     for (const ImageFacts& reference : facts) append(comparison_warnings(image, reference), found);
-    if (facts.size() == 1) append(reference_warnings(image, facts[0]), found);  // with two, their noise cancels
+    if (facts.size() == 1) append(reference_warnings(image, facts[0], may_have_two), found);
   }
   for (const auto& warnings : result)
     for (const std::string& warning : warnings)

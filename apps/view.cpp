@@ -251,7 +251,7 @@ std::vector<std::string> warnings_of(const ViewOptions& options) {
     std::erase(images, options.reference);
   }
   std::set<std::string> printed;
-  for (const std::vector<std::string>& warnings : warn_of_comparison(images, references, printed))
+  for (const std::vector<std::string>& warnings : warn_of_comparison(images, references, printed, false))
     for (const std::string& warning : warnings)
       if (std::find(all.begin(), all.end(), warning) == all.end()) all.push_back(warning);
   return all;

@@ -131,7 +131,7 @@ std::vector<std::string> image_warnings(const ImageFacts& image) {
   return warnings;
 }
 
-std::vector<std::string> reference_warnings(const ImageFacts& image, const ImageFacts& reference) {
+std::vector<std::string> reference_warnings(const ImageFacts& image, const ImageFacts& reference, bool may_have_two) {
   if (is_same_file(image.path, reference.path)) return {};
   std::vector<std::string> warnings;
   if (!denoised_by(reference.info.attributes, reference.info.channels).empty())
@@ -144,7 +144,8 @@ std::vector<std::string> reference_warnings(const ImageFacts& image, const Image
   const double error = predicted_of(image), of_itself = predicted_of(reference);
   // A denoised image may have the error of a hundred times as many samples.
   const bool is_denoised = !denoised_by(image.info.attributes, image.info.channels).empty();
-  if (warnings.empty() && of_itself == 0 && is_denoised && of_reference > 0 && of_reference < 100 * samples)
+  if (may_have_two && warnings.empty() && of_itself == 0 && is_denoised && of_reference > 0 &&
+      of_reference < 100 * samples)
     warnings.push_back(
         fmt::format("{} has an unknown error of its own, which is counted as {}'s, and {} is denoised: "
                     "two references would cancel it",

@@ -38,8 +38,9 @@ std::vector<std::string> comparison_warnings(const ImageFacts& image, const Imag
 /// interrupted render.
 std::vector<std::string> image_warnings(const ImageFacts& image);
 
-/// Reasons why errors of `image` against a single `reference` include the reference's own: it is denoised, or has no
-/// more samples than the image. With two halves of a reference, their noise cancels.
-std::vector<std::string> reference_warnings(const ImageFacts& image, const ImageFacts& reference);
+/// Reasons why errors of `image` against a single `reference` include the reference's own: it is denoised, has no more
+/// samples than the image, or an error that is not small beside the image's. With two halves of a reference, their
+/// noise cancels; `may_have_two`: the caller can take them, so that an unknown error is a reason, too.
+std::vector<std::string> reference_warnings(const ImageFacts& image, const ImageFacts& reference, bool may_have_two);
 
 }  // namespace covary
