@@ -19,6 +19,7 @@
 #include "film/merge.h"
 #include "film/outputs.h"
 #include "plans/plan.h"
+#include "progress.h"
 #include "value_names.h"
 
 namespace covary {
@@ -125,8 +126,8 @@ void merge(const MergeOptions& options) {
   merged.attributes[film_key::kVersion] = COVARY_VERSION;
   merged.attributes[film_key::kCommand] = command_line();
   write_film(options.output, merged, mean_of_groups(rows_of(merged, 0, merged.height())).std_error);
-  fmt::print(stderr, "{}: {} x {} pixels, {:g} samples per pixel\n", options.output, merged.width(), merged.height(),
-             merged.mean_count());
+  fmt::print(stderr, "{}: {} x {} pixels, {}\n", options.output, merged.width(), merged.height(),
+             samples_per_pixel_text(merged.mean_count()));
 }
 
 }  // namespace

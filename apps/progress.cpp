@@ -49,6 +49,10 @@ std::string cut_to(const std::string& text, int columns) {
 
 }  // namespace
 
+std::string samples_per_pixel_text(double samples) {
+  return fmt::format("{:g} {} per pixel", samples, samples == 1 ? "sample" : "samples");
+}
+
 std::string format_duration(double seconds) {
   const auto s = static_cast<int64_t>(std::ceil(std::max(0.0, seconds)));
   if (s < 3600) return fmt::format("{}:{:02}", s / 60, s % 60);

@@ -83,6 +83,9 @@ class ProgressLine {
 
 /// 75 -> "1:15", 4000 -> "1:06:40".
 std::string format_duration(double seconds);
+
+/// "1 sample per pixel", "2.5 samples per pixel".
+std::string samples_per_pixel_text(double samples);
 /// 1234567 -> "1.23 M".
 std::string format_count(double count);
 

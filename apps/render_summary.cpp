@@ -49,9 +49,7 @@ std::string samples_text(const RenderResult& result) {
   for (const Pass& pass : camera_passes(result.passes))
     passes += fmt::format("{}{:g} {}", passes.empty() ? " (" : " + ", pass.film.mean_count(), pass.plan.name);
   const bool several = camera_passes(result.passes).size() > 1;
-  const double samples = result.samples_per_pixel();
-  std::string text =
-      fmt::format("{:.6g} {} per pixel{}", samples, samples == 1 ? "sample" : "samples", several ? passes + ")" : "");
+  std::string text = samples_per_pixel_text(result.samples_per_pixel()) + (several ? passes + ")" : "");
   if (const Pass* light = light_pass(result.passes))
     text += fmt::format(" + {} light paths", format_count(static_cast<double>(light_paths(light->film))));
   return text;
@@ -131,9 +129,8 @@ void print_warnings(const RenderReport& report) {
   print_notes(report.options.settings.denoising, result.image.note);
   const double limit = report.options.request().seconds;
   if (limit > 0 && result.seconds.limited > 1.1 * limit)
-    fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for {:g} {} per pixel\n", limit,
-               result.seconds.limited, result.samples_per_pixel(),
-               result.samples_per_pixel() == 1 ? "sample" : "samples");
+    fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for {}\n", limit, result.seconds.limited,
+               samples_per_pixel_text(result.samples_per_pixel()));
 }
 
 }  // namespace

@@ -234,7 +234,8 @@ class Merge(CliTest):
     def test_merge(self):
         self.write("a.exr", film(1, samples=2, value=1))
         self.write("b.exr", film(2, samples=6, value=3))
-        self.good("merge", "b.exr", "a.exr", "-o", "ab.exr")
+        said = self.good("merge", "b.exr", "a.exr", "-o", "ab.exr").stderr
+        self.assertEqual(said, "ab.exr: 4 x 3 pixels, 16 samples per pixel\n")
         info = json.loads(self.good("info", "ab.exr", "--json").stdout)
         self.assertEqual(info["attributes"]["covary:seed"], "1,2")
         self.assertEqual(info["attributes"]["covary:samples"], "16")
