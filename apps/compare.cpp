@@ -48,7 +48,7 @@ void require_memory_to_compare(const CompareOptions& options, const std::string&
   constexpr double kImage = 3 * sizeof(float), kFlip = 120;  // metrics/flip.cpp
   const auto is_flip = [](const std::string& name) { return name == "flip"; };
   const bool flip = std::any_of(options.metrics.begin(), options.metrics.end(), is_flip);
-  const int band = std::min(rows.band_rows() + (flip ? 2 * kFlipReach : 0), rows.height());
+  const int band = std::min(rows.band_rows() + (flip ? 2 * kFlipHalo : 0), rows.height());
   require_image_memory(path, rows.width(), band, 2 * kImage * static_cast<double>(n_images) + (flip ? kFlip : 1));
   if (!options.error_map.empty()) require_image_memory(path, rows.width(), rows.height(), sizeof(float) + kImage);
 }

@@ -39,7 +39,7 @@ constexpr double kImagesOfLayer = 12;
 int groups_of(const std::optional<GroupedSource>& source) { return source ? source->groups : 0; }
 
 /// Layers and history are made of whole images.
-bool needs_whole(const CombineRequest& request) { return request.estimator.reach < 0 || !request.layers.empty(); }
+bool needs_whole(const CombineRequest& request) { return request.estimator.halo < 0 || !request.layers.empty(); }
 
 GroupedImage rows_of(const std::optional<GroupedSource>& source, int first, int n) {
   return source ? source->rows(first, n) : GroupedImage{};
@@ -105,7 +105,7 @@ MethodImage estimate(const CombineRequest& request) {
     };
     return estimator.image_in_rows({request.independent.width, height, in_memory, rows}, request.settings);
   }
-  const int step = std::max(kMinRows, in_memory - 2 * estimator.reach) / kResidualCell * kResidualCell;
+  const int step = std::max(kMinRows, in_memory - 2 * estimator.halo) / kResidualCell * kResidualCell;
   MethodImage whole;
   for (int y = 0; y < height; y += step) {
     const int n = std::min(step, height - y);
@@ -151,7 +151,7 @@ double memory_of_rows(const CombineRequest& request, int rows) {
   const double of_whole = n_features * kImage + (in_bands ? 3 * kImage + request.estimator.memory.of_whole : 0);
   const double library = request.estimator.network.empty() ? 0 : network_library_memory();
   const double kept =
-      in_bands && rows > 0 && request.estimator.image_in_rows ? memory_of_kept_rows(request.estimator.reach, width) : 0;
+      in_bands && rows > 0 && request.estimator.image_in_rows ? memory_of_kept_rows(request.estimator.halo, width) : 0;
   const double results = of_whole * width * request.independent.height + library + kept;
   const double layers = request.layers.empty() ? 0 : static_cast<double>(request.layers.size() + 1);
   const double of_method =
@@ -178,15 +178,15 @@ double max_memory_of(const CombineRequest& request) { return request.max_memory.
 int rows_in_memory(const CombineRequest& request) {
   const int rows = rows_within(request, request.memory);
   if (!request.estimator.image_in_rows || needs_whole(request)) return rows;
-  const int useful = kUsefulRows * request.estimator.reach;
+  const int useful = kUsefulRows * request.estimator.halo;
   if (rows >= useful) return rows;
   return std::max(rows, std::min(useful, rows_within(request, max_memory_of(request))));
 }
 
 double planned_memory(const CombineRequest& request) {
-  const int height = request.independent.height, reach = request.estimator.reach;
+  const int height = request.independent.height, halo = request.estimator.halo;
   const int cells = kRegressionCell + (request.estimator.image_in_rows ? kBandCell : 0);
-  const int fewest = needs_whole(request) ? height : std::min(height, kMinRows + cells + 2 * reach);
+  const int fewest = needs_whole(request) ? height : std::min(height, kMinRows + cells + 2 * halo);
   const int rows = std::max(fewest, rows_in_memory(request));
   const double of_rows = memory_of_rows(request, rows);
   if (request.estimator.network.empty() || rows >= height) return of_rows;
@@ -203,8 +203,8 @@ void limit_memory(CombineRequest& request, std::optional<double> mebibytes) {
 
 Band band_around(const CombineRequest& request, int first, int last) {
   // Start at a multiple of the cells of the residual correction.
-  const int begin = std::max(0, first - request.estimator.reach) / kResidualCell * kResidualCell;
-  const int n = std::min(request.independent.height, last + request.estimator.reach) - begin;
+  const int begin = std::max(0, first - request.estimator.halo) / kResidualCell * kResidualCell;
+  const int n = std::min(request.independent.height, last + request.estimator.halo) - begin;
   return {rows_of(request.crn, begin, n), request.independent.rows(begin, n), begin};
 }
 

@@ -34,7 +34,7 @@ struct CombineRequest {
   Method estimator;                    ///< of a pair of images, or of an independent one
   MethodSettings settings;
   bool force = false;  ///< combine even if there are errors among the findings
-  /// Memory limit in bytes: larger images are combined in bands of rows, with the same bits, if the estimator's reach
+  /// Memory limit in bytes: larger images are combined in bands of rows, with the same bits, if the estimator's halo
   /// is limited.
   double memory = std::numeric_limits<double>::infinity();
   /// Memory limit in bytes where bands do not help; default: memory_limit() (core/memory_limit.h).
@@ -78,7 +78,7 @@ struct Band {
   GroupedImage crn, independent;
   int first = 0;
 };
-/// Rows first … last - 1 and the estimator's reach on both sides, so that bands have the bits of the whole.
+/// Rows first … last - 1 and the estimator's halo on both sides, so that bands have the bits of the whole.
 Band band_around(const CombineRequest& request, int first, int last);
 
 /// The last steps for every image that a method made from films: its error follows from what the samples tell of it

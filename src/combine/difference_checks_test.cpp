@@ -28,14 +28,14 @@ test::Grouped good(int groups) { return test::independent_image(kWidth, kHeight,
 
 /// Each render filtered by a mean over 15 pixels of a row, mixing neighbours as a denoiser does.
 test::Grouped denoised(const test::Grouped& image) {
-  constexpr int kReach = 7;
+  constexpr int kHalo = 7;
   test::Grouped result = image;
   for (int y = 0; y < image.height; ++y)
-    for (int x = kReach; x + kReach < image.width; ++x)
+    for (int x = kHalo; x + kHalo < image.width; ++x)
       for (int i = 0; i < 3 * image.groups; ++i) {
         float sum = 0;
-        for (int dx = -kReach; dx <= kReach; ++dx) sum += image.view().pixel(x + dx, y)[i];
-        result.pixel(x, y)[i] = sum / (2 * kReach + 1);
+        for (int dx = -kHalo; dx <= kHalo; ++dx) sum += image.view().pixel(x + dx, y)[i];
+        result.pixel(x, y)[i] = sum / (2 * kHalo + 1);
       }
   return result;
 }

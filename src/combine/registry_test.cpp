@@ -271,7 +271,7 @@ std::string row_of(const Method& e) {
                        : pair           ? "CRN and independent"
                        : e.pixel_pass() ? "independent, all samples of a pixel"
                                         : "one of either kind";
-  const std::string combine = pair && e.reach < 0 ? "whole images" : pair || is_default ? "in bands" : "no";
+  const std::string combine = pair && e.halo < 0 ? "whole images" : pair || is_default ? "in bands" : "no";
   return fmt::format("| `{}` | {} | {} | {} | {} | {} |", e.name, passes, e.min_groups, yes_or_no(e.predicts_error),
                      yes_or_no(pair && e.pair()->explain), combine);
 }

@@ -88,7 +88,7 @@ RegressionFeatures regression_features(const Features& features, FilterKinds kin
 /// The names of filtered_candidates(), in order.
 std::vector<std::string> filter_names(const Features& features, CandidateBase base, FilterKinds kinds);
 /// Candidates without a network. The features must outlive the result. Rows of a larger image begin at a multiple of
-/// kRegressionCell; kCandidateReach rows from those that are missing, the bits are those of the whole.
+/// kRegressionCell; kCandidateHalo rows from those that are missing, the bits are those of the whole.
 CandidateMaker filtered_candidates(const Features& features, CandidateBase base = CandidateBase::kPair,
                                    FilterKinds kinds = FilterKinds::kNlMeans, const WantedRows& wanted = {});
 /// Throws Error(kInput) for auxiliary images with values that cannot be used (check_feature() of denoise.h).
@@ -115,9 +115,9 @@ CandidateMaker neural_candidates(const Features& features, const DenoiseOptions&
                                  std::shared_ptr<const NetworkImages> made = nullptr);
 
 /// Radius of influence of the input, and of the network's images, on a pixel of any candidate, in rows.
-inline constexpr int kCandidateReach = 36;
+inline constexpr int kCandidateHalo = 36;
 /// The same without a network.
-inline constexpr int kFiltersReach = kRegressionReach;
-static_assert(kFiltersReach >= kNlMeansReach);
+inline constexpr int kFiltersHalo = kRegressionHalo;
+static_assert(kFiltersHalo >= kNlMeansHalo);
 
 }  // namespace covary

@@ -14,7 +14,7 @@ namespace covary {
 namespace {
 
 /// Rows at a time, to bound the memory, and how far around they are read: patches of the window, and the variance.
-constexpr int kBandRows = 256, kReach = kNlMeansRadius + 1 + 2;
+constexpr int kBandRows = 256, kHalo = kNlMeansRadius + 1 + 2;
 /// Wide, because the noise that is left counts more than lost detail.
 constexpr float kBandwidth = 1;
 
@@ -39,8 +39,8 @@ std::vector<Image> denoised_references(std::span<const Image> references) {
                                                references[1].width, references[1].height));
   std::vector<Image> result(2, Image(width, height, 3));
   for (int y = 0; y < height; y += kBandRows) {
-    const int n = std::min(kBandRows, height - y), first = std::max(0, y - kReach);
-    const int end = std::min(height, y + n + kReach);
+    const int n = std::min(kBandRows, height - y), first = std::max(0, y - kHalo);
+    const int end = std::min(height, y + n + kHalo);
     const std::vector<float> data = groups_of(references, first, end);
     const DenoisingParts parts = parts_of_mean({width, end - first, 2, data.data()});
     std::vector<NlMeansSteering> steerings;

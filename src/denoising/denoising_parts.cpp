@@ -17,7 +17,7 @@ namespace {
 /// Weight of the surrounding pixels' variance, in groups, and the side of their window.
 constexpr float kPriorFreedom = 8;
 constexpr int kVarianceWindow = 5;
-static_assert(kLimitWindow / 2 + kVarianceWindow / 2 <= kMeanReach);
+static_assert(kLimitWindow / 2 + kVarianceWindow / 2 <= kMeanHalo);
 
 /// Sets non-finite values to 0: pixels that the estimator leaves out may hold anything.
 void make_finite(Image& image) {

@@ -52,7 +52,7 @@ DenoisingParts parts_of_pair(const Method& base, const GroupedImage& crn, const 
 DenoisingParts parts_of_mean(const GroupedImage& independent);
 /// Radius of influence of the samples on the parts of a mean, in rows; and on the pixels that a two-pass estimator
 /// fills in for those that are left out.
-inline constexpr int kMeanReach = 8, kFilledReach = 4;
+inline constexpr int kMeanHalo = 8, kFilledHalo = 4;
 /// The same without halves, for any number of groups. The standard error of a single group is 0.
 DenoisingParts whole_of_mean(const GroupedImage& independent);
 

@@ -9,7 +9,7 @@
 namespace covary {
 namespace {
 
-constexpr int kReach = kLimitWindow / 2;
+constexpr int kHalo = kLimitWindow / 2;
 
 float brightness(const float* rgb) { return (rgb[0] + rgb[1] + rgb[2]) / 3; }
 
@@ -37,13 +37,13 @@ std::vector<float> largest_around(const std::vector<float>& values, int width, i
   };
   parallel_for(height, 16, [&](int y) {
     for (int x = 0; x < width; ++x) {
-      const int first = std::max(0, x - kReach), end = std::min(width, x + kReach + 1);
+      const int first = std::max(0, x - kHalo), end = std::min(width, x + kHalo + 1);
       const size_t row = static_cast<size_t>(y) * width;
       along_rows[row + x] = largest(&values[row + first], 1, end - first);
     }
   });
   parallel_for(height, 16, [&](int y) {
-    const int first = std::max(0, y - kReach), end = std::min(height, y + kReach + 1);
+    const int first = std::max(0, y - kHalo), end = std::min(height, y + kHalo + 1);
     for (int x = 0; x < width; ++x)
       result[static_cast<size_t>(y) * width + x] =
           largest(&along_rows[static_cast<size_t>(first) * width + x], width, end - first);

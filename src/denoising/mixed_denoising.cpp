@@ -230,7 +230,7 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
 /// The same for images in rows, without history and layers.
 RowsMethod rows_of_mean(bool with_oidn) {
   RowsMethod method;
-  method.reach_of_parts = kMeanReach;
+  method.halo_of_parts = kMeanHalo;
   method.parts = [](const Samples& rows, const MethodSettings& settings) {
     DenoisingParts parts = parts_of_mean(rows.independent);
     parts.features = settings.features;
@@ -249,7 +249,7 @@ RowsMethod rows_of_mean(bool with_oidn) {
 RowsMethod rows_of_pair(const Method& base) {
   RowsMethod method;
   method.base = CandidateBase::kPair;
-  method.reach_of_parts = base.reach + kFilledReach;
+  method.halo_of_parts = base.halo + kFilledHalo;
   method.parts = [base](const Samples& rows, const MethodSettings& settings) {
     DenoisingParts parts = parts_of_pair(base, rows.crn, rows.independent, settings);
     parts.features = settings.features;
@@ -270,12 +270,12 @@ RowsMethod rows_of_pair(const Method& base) {
 
 /// Lets the method work on rows of images that are too large for memory.
 void allow_rows(const Method& base, const MixedDenoisingOptions& options, bool with_oidn, Method& method) {
-  method.reach = -1;
-  if (base.reach < 0 || options.history.before || options.history.keep_samples) return;
+  method.halo = -1;
+  if (base.halo < 0 || options.history.before || options.history.keep_samples) return;
   RowsMethod rows = base.is_mean() ? rows_of_mean(with_oidn) : rows_of_pair(base);
   rows.weighting = settings_of(options.mode).weighting;
   if (with_oidn) rows.network = options.oidn;
-  method.reach = rows_reach(rows);
+  method.halo = rows_halo(rows);
   method.memory.of_whole = bytes_of_whole(with_oidn);
   method.image_in_rows = [rows, options](const SamplesInRows& image, const MethodSettings& settings) {
     check_features(settings.features);

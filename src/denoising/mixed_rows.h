@@ -27,7 +27,7 @@ struct MixedRows {
 };
 
 /// Radius of influence of the mixture on the error, in rows; rows begin at a multiple of kResidualCell.
-inline constexpr int kErrorReach = 36;
+inline constexpr int kErrorHalo = 36;
 
 /// Of the mixture in `mixed`, which these parts became.
 MixedRows mixed_rows(const DenoisingParts& parts, const MixedParts& mixed, const std::vector<CandidateMaker>& makers,

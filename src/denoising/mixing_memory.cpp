@@ -35,11 +35,11 @@ double memory_beside_network(const MixtureSize& size, double n_pixels) {
   return n_pixels * of_pixel + network_tile_memory(n_pixels);
 }
 
-double memory_of_kept_rows(int reach, double width) {
-  // Images of three sets of samples and their candidates; of the reach on both sides, all but what samples and
+double memory_of_kept_rows(int halo, double width) {
+  // Images of three sets of samples and their candidates; of the halo on both sides, all but what samples and
   // candidates themselves reach.
-  constexpr double kOfPixel = 340, kOfReach = 0.85;
-  return kOfPixel * 2 * kOfReach * reach * width;
+  constexpr double kOfPixel = 340, kOfHalo = 0.85;
+  return kOfPixel * 2 * kOfHalo * halo * width;
 }
 
 double bytes_of_pair_mixture(bool with_network) {

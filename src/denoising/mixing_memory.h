@@ -17,7 +17,7 @@ double bytes_of_mixture(const MixtureSize& size);
 double memory_beside_network(const MixtureSize& size, double n_pixels);
 
 /// Bytes of the rows that bands of this radius of influence keep for the next, in images of so many columns.
-double memory_of_kept_rows(int reach, double width);
+double memory_of_kept_rows(int halo, double width);
 
 /// Bytes per pixel around the image of a pair of passes, beside what its estimator takes.
 double bytes_of_pair_mixture(bool with_network);

@@ -80,10 +80,12 @@ int n_candidates(const MixtureInput& in) { return static_cast<int>(in.halves[0]-
 
 std::vector<SampledRows> sampled_rows(int width, int height) {
   if (static_cast<double>(width) * height <= kMaxSampledPixels) return {{0, height}};
-  const double rows = std::max(1.0, std::round(kMaxSampledPixels / width / kSampledBlocks));
+  const double all = kMaxSampledPixels / width;
+  const int n_blocks = all < kSampledBlocks * kMinBlockRows ? 2 : kSampledBlocks;
+  const double rows = std::max(1.0, std::round(all / n_blocks));
   std::vector<SampledRows> blocks;
-  for (int i = 0; i < kSampledBlocks; ++i) {
-    const int first = static_cast<int>((i + 0.5) * height / kSampledBlocks - rows / 2);
+  for (int i = 0; i < n_blocks; ++i) {
+    const int first = static_cast<int>((i + 0.5) * height / n_blocks - rows / 2);
     blocks.push_back({std::max(0, first), std::min(height, first + static_cast<int>(rows))});
   }
   return blocks;

@@ -72,10 +72,10 @@ std::vector<float> weights_everywhere(const MixtureInput& input, int m, const st
 struct SampledRows {
   int first = 0, end = 0;
 };
-/// The rows that determine x0: all, or of an image of more than kMaxSampledPixels pixels, kSampledBlocks blocks,
-/// evenly distributed.
+/// The rows that determine x0: all, or of an image of more than kMaxSampledPixels pixels, evenly distributed blocks:
+/// kSampledBlocks, or two if these had fewer than kMinBlockRows rows each, since a band makes rows around each block.
 std::vector<SampledRows> sampled_rows(int width, int height);
-inline constexpr double kMaxSampledPixels = 1 << 21;
+inline constexpr double kMaxSampledPixels = 1 << 21, kMinBlockRows = 96;
 inline constexpr int kSampledBlocks = 4;
 
 struct Mixture {

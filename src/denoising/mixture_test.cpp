@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <utility>
+#include <vector>
 
 #include "estimators/test_images.h"
 #include "risk/held_out_error.h"
@@ -272,6 +274,21 @@ TEST(HeldOutError, IsWhereImagesDisagreeAndAsLargeInAll) {
   }
   EXPECT_NEAR(sums[1] / sums[0], 1, 0.02) << "one channel of three";
   EXPECT_NEAR(ends[1] / ends[0], 16, 2);
+}
+
+TEST(SampledRows, AreFewBlocksWhereRowsAreLong) {
+  EXPECT_EQ(sampled_rows(1280, 720).size(), 1u);  // all rows
+  for (const auto& [width, n] : {std::pair{2048, 4}, {5120, 4}, {7680, 2}, {15360, 2}}) {
+    const std::vector<SampledRows> blocks = sampled_rows(width, width * 9 / 16);
+    ASSERT_EQ(blocks.size(), static_cast<size_t>(n)) << width;
+    double pixels = 0;
+    for (size_t i = 0; i < blocks.size(); ++i) {
+      EXPECT_GT(blocks[i].first, i > 0 ? blocks[i - 1].end : 0);
+      pixels += static_cast<double>(blocks[i].end - blocks[i].first) * width;
+    }
+    EXPECT_NEAR(pixels, kMaxSampledPixels, 2.0 * n * width);
+    EXPECT_LT(blocks.back().end, width * 9 / 16);
+  }
 }
 
 }  // namespace

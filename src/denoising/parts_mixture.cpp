@@ -164,7 +164,7 @@ void add_weighed(const std::vector<const DenoisingPart*>& parts, const std::vect
 
 namespace {
 
-constexpr int kCellsReach = 32;  // of guided_cells.h
+constexpr int kCellsHalo = 32;  // of guided_cells.h
 
 /// The prior of the weights.
 void set_prior(bool is_mean, const std::vector<CandidateMaker>& makers, const PartsWeighting& chosen, double samples,
@@ -190,8 +190,8 @@ MixtureInput input_of_halves(const DenoisingParts& parts, const PartsWeighting& 
 
 }  // namespace
 
-int mixture_reach(bool is_mean, const PartsWeighting& chosen) {
-  return kCellsReach + (chosen.residual_correction && !is_mean ? residual_correction_reach({}) : 0);
+int mixture_halo(bool is_mean, const PartsWeighting& chosen) {
+  return kCellsHalo + (chosen.residual_correction && !is_mean ? residual_correction_halo({}) : 0);
 }
 
 std::vector<NormalRow> normal_rows_of(const DenoisingParts& parts, std::vector<CandidateSet> sets,

@@ -77,6 +77,6 @@ std::vector<float> weights_of_whole(bool is_mean, const std::vector<CandidateMak
                                     const PartsWeighting& chosen, double samples, const std::vector<NormalRow>& rows);
 
 /// Radius of influence of the candidates on the mixture, in rows; cells are aligned to multiples of kResidualCell.
-int mixture_reach(bool is_mean, const PartsWeighting& chosen);
+int mixture_halo(bool is_mean, const PartsWeighting& chosen);
 
 }  // namespace covary

@@ -12,27 +12,27 @@ namespace covary {
 
 static_assert(kBandCell % kResidualCell == 0 && kBandCell % kRegressionCell == 0 && kBandCell % kWeighingRows == 0);
 
-std::vector<RowBand> bands_of(int height, int rows_at_once, const RowReach& reach, int first, int end) {
-  const int step = std::max(kBandCell, (rows_at_once - reach.above - reach.below) / kBandCell * kBandCell - kBandCell);
+std::vector<RowBand> bands_of(int height, int rows_at_once, const RowHalo& halo, int first, int end) {
+  const int step = std::max(kBandCell, (rows_at_once - halo.above - halo.below) / kBandCell * kBandCell - kBandCell);
   std::vector<RowBand> bands;
   for (int y = first; y < end; y += step) {
-    const int n = std::min(step, end - y), begin = std::max(0, y - reach.above) / kBandCell * kBandCell;
-    bands.push_back({begin, std::min(height, y + n + reach.below) - begin, y - begin, y, n});
+    const int n = std::min(step, end - y), begin = std::max(0, y - halo.above) / kBandCell * kBandCell;
+    bands.push_back({begin, std::min(height, y + n + halo.below) - begin, y - begin, y, n});
   }
   return bands;
 }
 
-int weighing_reach(CandidateBase base, bool with_network) {
-  return base == CandidateBase::kMean && !with_network ? kWeighingReach : 0;
+int weighing_halo(CandidateBase base, bool with_network) {
+  return base == CandidateBase::kMean && !with_network ? kWeighingHalo : 0;
 }
 
-int candidates_reach(CandidateBase base, bool with_network, int reach_of_parts) {
-  return reach_of_parts + kCandidateReach + weighing_reach(base, with_network);
+int candidates_halo(CandidateBase base, bool with_network, int halo_of_parts) {
+  return halo_of_parts + kCandidateHalo + weighing_halo(base, with_network);
 }
 
-int mixed_reach(CandidateBase base, bool with_network, int reach_of_parts, const PartsWeighting& weighting) {
-  return candidates_reach(base, with_network, reach_of_parts) + mixture_reach(base == CandidateBase::kMean, weighting) +
-         kErrorReach;
+int mixed_halo(CandidateBase base, bool with_network, int halo_of_parts, const PartsWeighting& weighting) {
+  return candidates_halo(base, with_network, halo_of_parts) + mixture_halo(base == CandidateBase::kMean, weighting) +
+         kErrorHalo;
 }
 
 FeatureRows::FeatureRows(const Features& whole, int first, int n) {

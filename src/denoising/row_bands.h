@@ -19,21 +19,21 @@ struct RowBand {
   int first = 0, rows = 0, skipped = 0, y = 0, n = 0;
 };
 /// Rows that a band needs beside those that are wanted.
-struct RowReach {
+struct RowHalo {
   int above = 0, below = 0;
-  RowReach(int both) : above(both), below(both) {}
-  RowReach(int rows_above, int rows_below) : above(rows_above), below(rows_below) {}
+  RowHalo(int both) : above(both), below(both) {}
+  RowHalo(int rows_above, int rows_below) : above(rows_above), below(rows_below) {}
 };
 /// Bands of an image of `height` rows that hold its rows first … end - 1, and those that they reach: of at most
-/// `rows_at_once` rows if these are more than the reach.
-std::vector<RowBand> bands_of(int height, int rows_at_once, const RowReach& reach, int first, int end);
+/// `rows_at_once` rows if these are more than the halo.
+std::vector<RowBand> bands_of(int height, int rows_at_once, const RowHalo& halo, int first, int end);
 
 /// Radius of influence of the candidates that are made of the images on all candidates.
-int weighing_reach(CandidateBase base, bool with_network);
-/// Radius of influence of the images on a pixel of any candidate, and of the mixture with its error. `reach_of_parts`:
+int weighing_halo(CandidateBase base, bool with_network);
+/// Radius of influence of the images on a pixel of any candidate, and of the mixture with its error. `halo_of_parts`:
 /// on what the candidates are made of.
-int candidates_reach(CandidateBase base, bool with_network, int reach_of_parts);
-int mixed_reach(CandidateBase base, bool with_network, int reach_of_parts, const PartsWeighting& weighting);
+int candidates_halo(CandidateBase base, bool with_network, int halo_of_parts);
+int mixed_halo(CandidateBase base, bool with_network, int halo_of_parts, const PartsWeighting& weighting);
 
 /// Rows of auxiliary images.
 struct FeatureRows {

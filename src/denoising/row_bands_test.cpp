@@ -10,17 +10,17 @@ namespace covary {
 namespace {
 
 TEST(RowBands, CoverTheRowsOnceWithTheirReach) {
-  constexpr int kHeight = 700, kReach = 50;
+  constexpr int kHeight = 700, kHalo = 50;
   for (const int at_once : {10, 130, 200, 333}) {
     int next = 100;
-    for (const RowBand& band : bands_of(kHeight, at_once, kReach, 100, 650)) {
+    for (const RowBand& band : bands_of(kHeight, at_once, kHalo, 100, 650)) {
       EXPECT_EQ(band.y, next);
       EXPECT_EQ(band.first + band.skipped, band.y);
       EXPECT_EQ(band.first % kBandCell, 0);
-      EXPECT_LE(band.first, std::max(0, band.y - kReach));
-      EXPECT_GE(band.first + band.rows, std::min(kHeight, band.y + band.n + kReach));
+      EXPECT_LE(band.first, std::max(0, band.y - kHalo));
+      EXPECT_GE(band.first + band.rows, std::min(kHeight, band.y + band.n + kHalo));
       EXPECT_LE(band.first + band.rows, kHeight);
-      EXPECT_LE(band.rows, std::max(at_once, 2 * kReach + 2 * kBandCell)) << at_once;
+      EXPECT_LE(band.rows, std::max(at_once, 2 * kHalo + 2 * kBandCell)) << at_once;
       next += band.n;
     }
     EXPECT_EQ(next, 650);

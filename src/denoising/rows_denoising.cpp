@@ -77,7 +77,7 @@ class RowsDenoising {
     MixedRows whole;
     std::vector<CandidateMaker> makers;
     std::string base;
-    const int of_mixture = kErrorReach + mixture_reach(is_mean, method_.weighting);
+    const int of_mixture = kErrorHalo + mixture_halo(is_mean, method_.weighting);
     for_each_made(of_mixture + of_weighing(), 0, image_.height, true, [&](const RowBand& band, MadeRows& rows) {
       rows.weigh();
       append_mixed({band.y - of_mixture, band.y + band.n + of_mixture, image_.height}, band, rows, whole);
@@ -89,10 +89,10 @@ class RowsDenoising {
   }
 
  private:
-  /// Calls f(band, y, n) for bands that hold rows y … y + n - 1 and `reach` more on both sides.
+  /// Calls f(band, y, n) for bands that hold rows y … y + n - 1 and `halo` more on both sides.
   template <typename Function>
-  void for_each_band(int reach, int first, int end, const Function& f) const {
-    for (const RowBand& b : bands_of(image_.height, image_.rows_at_once, reach, first, end)) {
+  void for_each_band(int halo, int first, int end, const Function& f) const {
+    for (const RowBand& b : bands_of(image_.height, image_.rows_at_once, halo, first, end)) {
       Band band{b.first, b.skipped, image_.rows(b.first, b.rows), FeatureRows(settings_.features, b.first, b.rows),
                 settings_};
       band.settings.features = band.features.features;
@@ -100,21 +100,21 @@ class RowsDenoising {
     }
   }
 
-  int of_candidates() const { return method_.network ? kCandidateReach : kFiltersReach; }
-  int of_weighing() const { return weighing_reach(method_.base, method_.network.has_value()); }
+  int of_candidates() const { return method_.network ? kCandidateHalo : kFiltersHalo; }
+  int of_weighing() const { return weighing_halo(method_.base, method_.network.has_value()); }
 
-  /// Calls f(band, rows) for bands that hold rows first … end - 1 and `reach` more on both sides, with the candidates
+  /// Calls f(band, rows) for bands that hold rows first … end - 1 and `halo` more on both sides, with the candidates
   /// of all of these, which f may use up. `with_whole`: of all samples, too.
   template <typename Function>
-  void for_each_made(int reach, int first, int end, bool with_whole, const Function& f) const {
-    const int around = method_.reach_of_parts, below = std::max(reach + of_candidates(), around);
-    const int above = first > 0 ? below : std::max({reach, of_candidates(), around});  // there, candidates are kept
+  void for_each_made(int halo, int first, int end, bool with_whole, const Function& f) const {
+    const int around = method_.halo_of_parts, below = std::max(halo + of_candidates(), around);
+    const int above = first > 0 ? below : std::max({halo, of_candidates(), around});  // there, candidates are kept
     const int of_first = first > 0 ? 2 * around + kBandCell : 0;
     const std::vector<RowBand> bands =
         bands_of(image_.height, image_.rows_at_once - of_first, {above, below}, first, end);
     KeptRows kept;
     for (size_t i = 0; i < bands.size(); ++i) {
-      MadeRows rows = made_rows(bands[i], std::min(image_.height, bands[i].y + bands[i].n + reach), with_whole,
+      MadeRows rows = made_rows(bands[i], std::min(image_.height, bands[i].y + bands[i].n + halo), with_whole,
                                 std::exchange(kept, {}));
       if (i + 1 < bands.size()) kept = KeptRows(bands[i + 1].first, rows);
       f(bands[i], rows);
@@ -139,7 +139,7 @@ class RowsDenoising {
   }
 
   DenoisingParts parts_of_rows(int from, int end) const {
-    const Rows around(from - method_.reach_of_parts, end + method_.reach_of_parts, image_.height);
+    const Rows around(from - method_.halo_of_parts, end + method_.halo_of_parts, image_.height);
     const Samples samples = image_.rows(around.first, around.n);
     const FeatureRows features(settings_.features, around.first, around.n);
     MethodSettings settings = settings_;
@@ -154,7 +154,7 @@ class RowsDenoising {
     DenoisingParts& parts = rows.parts;
     leave_rows(mixed.first - rows.first, mixed.n, parts), leave_rows(mixed.first - rows.first, mixed.n, rows.sets);
     MixedParts mixture = mix_sets(parts, std::move(rows.sets), rows.makers, method_.weighting, &whole_);
-    const Rows left(band.y - kErrorReach, band.y + band.n + kErrorReach, image_.height);
+    const Rows left(band.y - kErrorHalo, band.y + band.n + kErrorHalo, image_.height);
     leave_rows(left.first - mixed.first, left.n, parts), leave_rows(left.first - mixed.first, left.n, mixture);
     const Samples samples = image_.rows(left.first, left.n);
     const FeatureRows features(settings_.features, left.first, left.n);
@@ -197,7 +197,7 @@ class RowsDenoising {
 
   void denoise_by_network() {
     std::array<Image, 3> noisy;
-    for_each_band(method_.reach_of_parts, 0, image_.height, [&](const Band& band, int y, int n) {
+    for_each_band(method_.halo_of_parts, 0, image_.height, [&](const Band& band, int y, int n) {
       const std::array<Image, 3> rows = noisy_rows(band);
       for (size_t i = 0; i < rows.size(); ++i) copy_rows(rows[i], band.skipped, y, n, image_.height, noisy[i]);
     });
@@ -238,7 +238,7 @@ class RowsDenoising {
 
   MethodImage by_bands_of_few() const {
     MethodImage whole;
-    for_each_band(method_.reach_of_parts + kCandidateReach, 0, image_.height, [&](const Band& band, int y, int n) {
+    for_each_band(method_.halo_of_parts + kCandidateHalo, 0, image_.height, [&](const Band& band, int y, int n) {
       const MethodImage part =
           method_.of_few(band.rows, band.settings,
                          makers_of(band.features.features, {.first_row = band.first}, band.rows.independent.height));
@@ -268,8 +268,8 @@ class RowsDenoising {
 
 }  // namespace
 
-int rows_reach(const RowsMethod& method) {
-  return mixed_reach(method.base, method.network.has_value(), method.reach_of_parts, method.weighting);
+int rows_halo(const RowsMethod& method) {
+  return mixed_halo(method.base, method.network.has_value(), method.halo_of_parts, method.weighting);
 }
 
 double bytes_of_whole(bool with_network) {

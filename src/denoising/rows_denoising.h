@@ -21,7 +21,7 @@ namespace covary {
 struct RowsMethod {
   PartsWeighting weighting;
   CandidateBase base = CandidateBase::kMean;
-  int reach_of_parts = 0;  ///< radius of influence of the images on the parts
+  int halo_of_parts = 0;  ///< radius of influence of the images on the parts
   std::function<DenoisingParts(const Samples& rows, const MethodSettings& settings)> parts;
   std::function<CandidateMaker(const Features& features, const WantedRows& wanted)> filters;
   std::optional<DenoiseOptions> network;
@@ -34,7 +34,7 @@ struct RowsMethod {
 };
 
 /// Radius of influence of the image on a pixel, in rows.
-int rows_reach(const RowsMethod& method);
+int rows_halo(const RowsMethod& method);
 
 /// Bytes per pixel of the whole image that are needed beside the bands and the result.
 double bytes_of_whole(bool with_network);

@@ -74,13 +74,13 @@ void check(const Method& estimator, const Scene& scene, bool with_features, int 
   const GroupedImage crn = is_pair ? scene.crn.view() : GroupedImage(), independent = scene.independent.view();
   const MethodSettings settings = scene.settings(with_features);
   ASSERT_TRUE(estimator.image_in_rows) << what;
-  ASSERT_GT(scene.height, 2 * estimator.reach + spare) << what << ": there is more than one band";
+  ASSERT_GT(scene.height, 2 * estimator.halo + spare) << what << ": there is more than one band";
   int most = 0;
   const auto rows = [&](int first, int n) {
     most = std::max(most, n);
     return Samples{is_pair ? rows_of(crn, first, n) : GroupedImage(), rows_of(independent, first, n)};
   };
-  const int at_once = 2 * estimator.reach + spare;
+  const int at_once = 2 * estimator.halo + spare;
   expect_equal(estimator.image_in_rows({kWidth, scene.height, at_once, rows}, settings),
                estimator.image({crn, independent}, settings), what);
   EXPECT_LE(most, at_once) << what;

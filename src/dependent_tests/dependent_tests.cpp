@@ -157,10 +157,10 @@ Image filter_and_combine(const GroupedImage& crn, const GroupedImage& independen
 }
 
 /// Rows in a band, without the surrounding ones it needs; small bands would spend most time on the latter.
-int rows_of_band(int width, int reach) {
+int rows_of_band(int width, int halo) {
   constexpr int kMin = 64;
   const double rows = kDependentTestsBand / (kDependentTestsBytesPerPixel * width);
-  return std::max(kMin, static_cast<int>(rows) - 2 * reach);
+  return std::max(kMin, static_cast<int>(rows) - 2 * halo);
 }
 
 }  // namespace
@@ -197,8 +197,8 @@ EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& ind
   check(crn, independent, problems);
   throw_if_any(kDependentTests, problems);
 
-  const int width = crn.width, height = crn.height, reach = dependent_tests_reach(options);
-  const int step = rows_of_band(width, reach);
+  const int width = crn.width, height = crn.height, halo = dependent_tests_halo(options);
+  const int step = rows_of_band(width, halo);
   EstimatorResult result;
   const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
   if (stages || step >= height) {
@@ -207,8 +207,8 @@ EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& ind
   }
   result.estimate = Image(width, height, 3);
   for (int y = 0; y < height; y += step) {
-    const int own = std::min(step, height - y), first = std::max(0, y - reach);
-    const int rows = std::min(height, y + own + reach) - first;
+    const int own = std::min(step, height - y), first = std::max(0, y - halo);
+    const int rows = std::min(height, y + own + halo) - first;
     const auto valid_rows = valid.begin() + static_cast<std::ptrdiff_t>(first) * width;
     const Image band = filter_and_combine(rows_of(crn, first, rows), rows_of(independent, first, rows),
                                           {valid_rows, valid_rows + static_cast<std::ptrdiff_t>(rows) * width}, options,
@@ -218,12 +218,12 @@ EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& ind
   return result;
 }
 
-int dependent_tests_reach(const DependentTestsOptions& options) {
+int dependent_tests_halo(const DependentTestsOptions& options) {
   const bool paper = options.filter == DependentFilter::kPaper;
   const int window = paper ? options.regions.max_region : options.window;
   const int filter = std::max(window / 2 + options.smoothing / 2, paper ? 0 : options.guard / 2);
   const bool measured = options.weights == CombinationWeights::kMeasured;
-  return filter + (measured ? least_error_mixture_reach(options.measure_window) : 0);
+  return filter + (measured ? least_error_mixture_halo(options.measure_window) : 0);
 }
 
 namespace {
@@ -281,7 +281,7 @@ Method make_dependent_tests(Settings& p) {
   estimator.summary = "dependent tests driven filtering";
   estimator.min_groups = 2;
   estimator.adaptive = adaptive;
-  estimator.reach = dependent_tests_reach(o);
+  estimator.halo = dependent_tests_halo(o);
   estimator.memory.always = kDependentTestsBytesPerPixel;
   estimator.memory.largest_part = kDependentTestsBand;
   estimator.passes = PassPair{.image = [o = o](const GroupedImage& crn, const GroupedImage& independent,

@@ -81,7 +81,7 @@ EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& ind
                                 const DependentFilters& filters = {});
 
 /// Radius of influence of the input on a pixel, in rows or columns.
-int dependent_tests_reach(const DependentTestsOptions& options);
+int dependent_tests_halo(const DependentTestsOptions& options);
 
 /// Approximate memory of dependent_tests() beyond its input, including its result: bytes per pixel.
 inline constexpr double kDependentTestsBytesPerPixel = 4.0 * (3 + 3 + 2 + 2 + 7 + 4 + 7 + 3 + 6 + 1) + 24;

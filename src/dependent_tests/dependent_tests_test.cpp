@@ -385,13 +385,13 @@ TEST(DependentTests, HasTheSameBitsForAnyNumberOfThreads) {
   }
 }
 
-/// Rows beyond the reach change nothing.
+/// Rows beyond the halo change nothing.
 TEST(DependentTests, LooksNoFartherThanItsReach) {
   const test::Grouped crn = test::crn_image(20, 90, 3, 5);
   const test::Grouped independent = test::independent_image(20, 90, 3, 5);
   for (const DependentTestsOptions& options : {DependentTestsOptions(), DependentTestsOptions::paper()}) {
     const EstimatorResult whole = dependent_tests(crn.view(), independent.view(), options);
-    const int first = 45 - dependent_tests_reach(options), rows = 2 * dependent_tests_reach(options) + 1;
+    const int first = 45 - dependent_tests_halo(options), rows = 2 * dependent_tests_halo(options) + 1;
     const auto part = [&](const test::Grouped& image) {
       return GroupedImage{20, rows, image.groups, image.view().pixel(0, first)};
     };

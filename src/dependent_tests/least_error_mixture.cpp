@@ -136,6 +136,6 @@ Image least_error_mixture(const FilterInput& input, const Planes& noise, const s
   return result;
 }
 
-int least_error_mixture_reach(int window) { return window / 2 + kBrightnessWindow / 2; }
+int least_error_mixture_halo(int window) { return window / 2 + kBrightnessWindow / 2; }
 
 }  // namespace covary

@@ -37,6 +37,6 @@ Image least_error_mixture(const FilterInput& input, const Planes& noise, const s
                           std::span<const MixtureCandidate> candidates, int window, const Planes* brightest = nullptr);
 
 /// Radius of influence of input and candidates on a pixel, in rows or columns.
-int least_error_mixture_reach(int window);
+int least_error_mixture_halo(int window);
 
 }  // namespace covary

@@ -62,7 +62,7 @@ Method make_cv_baseline(Settings& parameters) {
   estimator.predicts_error = true;
   estimator.reliable_samples = kReliableSamples;
   estimator.min_groups = 3;
-  estimator.reach = o.window / 2 + kMissingWindow / 2;
+  estimator.halo = o.window / 2 + kMissingWindow / 2;
   estimator.memory.always = kCvBaselineBytesPerPixel;
   return estimator;
 }

@@ -193,7 +193,7 @@ Method make_iduw(Settings& parameters) {
   estimator.passes = pair;
   estimator.summary = "input-dependent uncorrelated weighting";
   estimator.min_groups = 4;
-  estimator.reach = -1;
+  estimator.halo = -1;
   estimator.memory.always = kIduwBytesPerPixel;
   return estimator;
 }

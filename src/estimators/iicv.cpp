@@ -74,8 +74,8 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
   return result;
 }
 
-int iicv_reach(const IicvOptions& options) {
-  const int correction = options.residual_correction ? residual_correction_reach(options.residual_options) : 0;
+int iicv_halo(const IicvOptions& options) {
+  const int correction = options.residual_correction ? residual_correction_halo(options.residual_options) : 0;
   return options.window / 2 + std::max(kPilotWindow, kMissingWindow) / 2 + correction;
 }
 
@@ -119,7 +119,7 @@ Method make_iicv(Settings& p) {
   estimator.holds_out = o.residual_correction;
   estimator.reliable_samples = kReliableSamples;
   estimator.min_groups = 3;
-  estimator.reach = iicv_reach(o);
+  estimator.halo = iicv_halo(o);
   estimator.memory.always = iicv_bytes_per_pixel(o);
   return estimator;
 }

@@ -74,7 +74,7 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
 
 /// Radius of influence of the input on a pixel, in rows or columns. A crop that begins at a row and column that are
 /// multiples of kResidualCell has the same bits as the whole image farther than this from its cut edges.
-int iicv_reach(const IicvOptions& options);
+int iicv_halo(const IicvOptions& options);
 
 /// Approximate memory of iicv() beyond its input, including its result: bytes per pixel.
 double iicv_bytes_per_pixel(const IicvOptions& options);

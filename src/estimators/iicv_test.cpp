@@ -299,9 +299,9 @@ TEST(Iicv, BandsGiveTheSameBits) {
   IicvOptions options;
   options.std_error = true;
   const EstimatorResult whole = iicv(crn.view(), independent.view(), options);
-  const int reach = iicv_reach(options);
+  const int halo = iicv_halo(options);
   for (int y0 = 0; y0 < 140; y0 += 34) {
-    const int first = std::max(0, (y0 - reach) / kResidualCell * kResidualCell), last = std::min(140, y0 + 34 + reach);
+    const int first = std::max(0, (y0 - halo) / kResidualCell * kResidualCell), last = std::min(140, y0 + 34 + halo);
     const auto band = [&](const GroupedImage& image) {
       return GroupedImage{50, last - first, 6, image.pixel(0, first)};
     };
@@ -386,11 +386,11 @@ TEST(Iicv, BitsDoNotDependOnThreadsTilesOrCrops) {
       std::copy_n(image.view().pixel(x0, y0 + y), static_cast<size_t>(width) * image.groups * 3, part.pixel(0, y));
     return part;
   };
-  const int reach = iicv_reach(options);
-  ASSERT_LT(2 * reach, height);
+  const int halo = iicv_halo(options);
+  ASSERT_LT(2 * halo, height);
   const EstimatorResult part = iicv(crop(crn).view(), crop(independent).view(), options);
-  for (int y = reach; y < height - reach; ++y)
-    for (int x = reach; x < width - reach; ++x)
+  for (int y = halo; y < height - halo; ++y)
+    for (int x = halo; x < width - halo; ++x)
       for (int c = 0; c < 3; ++c)
         ASSERT_EQ(part.estimate.pixel(x, y)[c], one.estimate.pixel(x0 + x, y0 + y)[c]) << x << ", " << y;
 }

@@ -142,7 +142,7 @@ struct Method {
   uint32_t reliable_samples = 0;
   bool reads_features = false;  ///< whether it uses MethodSettings::features
 
-  int reach = 0;  ///< extra rows on each side that a band of rows needs; -1: needs the whole image
+  int halo = 0;  ///< extra rows on each side that a band of rows needs; -1: needs the whole image
   /// The image of all rows, with the same bits, for methods whose bands share more than pixels; otherwise empty.
   /// Without layers; features are those of the whole image.
   std::function<MethodImage(const SamplesInRows& samples, const MethodSettings& settings)> image_in_rows;

@@ -127,7 +127,7 @@ TEST(UnequalCounts, APartWithEqualCountsGivesTheBitsOfTheWhole) {
   GroupedImage top = whole, crn_top = crn.view();
   top.height = crn_top.height = 160;
   const EstimatorResult all = iicv(crn.view(), whole), part = iicv(crn_top, top);
-  const int rows = (160 - iicv_reach({})) / 4 * 4;
+  const int rows = (160 - iicv_halo({})) / 4 * 4;
   ASSERT_GT(rows, 16);
   for (int y = 0; y < rows; ++y)
     for (int x = 0; x < 40; ++x)

@@ -50,14 +50,14 @@ class GuidedCells {
   /// `count`, `add`: as for sums_by_cell().
   template <typename Add>
   GuidedCells(const Image& guide, const std::vector<unsigned char>& valid, int count, const Add& add)
-      : guide_(guide), count_(count), cells_(sums_by_cell(kCell, kReach, guide, valid, count, add)) {}
+      : guide_(guide), count_(count), cells_(sums_by_cell(kCell, kHalo, guide, valid, count, add)) {}
 
   /// The guided sums at the pixels (x + lane, y).
   void sum(int x, int y, lanes::vfloat* sums) const;
 
  private:
   static constexpr int kCell = 4, kRadius = 7;  // side of a cell in pixels; radius of the window in cells
-  static constexpr int kReach = kCell * kRadius;
+  static constexpr int kHalo = kCell * kRadius;
   const Image& guide_;
   int count_;
   Planes cells_;

@@ -34,13 +34,13 @@ struct NlMeansSteering {
 /// Radius of the window of weights around a pixel.
 inline constexpr int kNlMeansRadius = 10;
 /// Radius of influence of the input on a pixel, in rows or columns.
-inline constexpr int kNlMeansReach = kNlMeansRadius + 1;
+inline constexpr int kNlMeansHalo = kNlMeansRadius + 1;
 
 /// The weighted means of all sources of all tasks of all steerings, in this order. Tasks of one steering share their
 /// distances, and all steerings those of the features, so that further ones cost less. Pixels whose weights are all
 /// zero keep the source's value. All images must have three channels, the same size and finite values. Bit-identical
 /// for any number of threads. `features`: q, any number of planes, border of at least kNlMeansRadius; may be null.
-/// `valid`: pixels with 0 are left out of all sums. Of rows of a larger image, those at least kNlMeansReach away from
+/// `valid`: pixels with 0 are left out of all sums. Of rows of a larger image, those at least kNlMeansHalo away from
 /// those that are missing have the bits of the whole.
 std::vector<Image> nl_means(std::span<const NlMeansSteering> steerings, const Planes* features,
                             const std::vector<unsigned char>& valid, const WantedRows& wanted = {});

@@ -29,13 +29,13 @@ struct RegressionInput {
   std::vector<const Image*> sources, others;
   const Image* position = nullptr;  ///< of the surfaces, in any unit; or null
   bool coarse = false;              ///< planes around every fourth pixel of every fourth row instead
-  /// Rows of a larger image begin at a multiple of kRegressionCell; those at least kRegressionReach away from those
+  /// Rows of a larger image begin at a multiple of kRegressionCell; those at least kRegressionHalo away from those
   /// that are missing have the bits of the whole.
   WantedRows wanted = {};
 };
 
-inline constexpr int kRegressionCell = 12;   ///< the windows of both kinds begin anew
-inline constexpr int kRegressionReach = 22;  ///< radius of influence of the input on a pixel, in rows or columns
+inline constexpr int kRegressionCell = 12;  ///< the windows of both kinds begin anew
+inline constexpr int kRegressionHalo = 22;  ///< radius of influence of the input on a pixel, in rows or columns
 
 /// The filtered sources. All images must have three channels, the same size and finite values; results may be negative,
 /// as models are. Linear in sources and others. `features`: up to kMaxFeatures channels, with values of order 1.

@@ -59,7 +59,7 @@ struct ResidualOptions {
 /// Cells are aligned to multiples of this.
 inline constexpr int kResidualCell = 4;
 /// Radius of influence of the input on a pixel's correction, in rows or columns.
-inline int residual_correction_reach(const ResidualCorrectionOptions& options) {
+inline int residual_correction_halo(const ResidualCorrectionOptions& options) {
   return 2 * (options.window / 2 + kResidualCell);
 }
 

@@ -53,13 +53,13 @@ EstimatorResult in_bands(const GroupedImage& crn, const GroupedImage& independen
         continue;
       }
     }
-    const int own = (rows_at_once - 2 * needs.reach) / needs.alignment * needs.alignment;
+    const int own = (rows_at_once - 2 * needs.halo) / needs.alignment * needs.alignment;
     if (own < needs.alignment)
       throw device::Failure(device::FailureKind::kMemory,
                             "the device's memory is too small even for parts of the image");
     const int last = std::min(height, y + own);
-    const int from = std::max(0, (y - needs.reach) / needs.alignment * needs.alignment);
-    const int to = std::min(height, last + needs.reach);
+    const int from = std::max(0, (y - needs.halo) / needs.alignment * needs.alignment);
+    const int to = std::min(height, last + needs.halo);
     try {
       const EstimatorResult part = band(rows_of(a, from, to - from), rows_of(b, from, to - from));
       copy_rows(part.estimate, y - from, y, last - y, height, whole.estimate);

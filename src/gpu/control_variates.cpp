@@ -231,8 +231,8 @@ EstimatorResult run(Device& device, const GroupedImage& crn, const GroupedImage&
   needs.bytes_per_pixel = 12.0 * (crn.groups + independent.groups) + record + 2.0 * s.k + 24 + 45 + 84;
   needs.largest_buffer_per_pixel = std::max({groups, record, 2.0 * s.k});
   needs.alignment = kResidualCell;
-  needs.reach = s.window / 2 + kMissingWindow / 2 +
-                (steps.residual_correction ? residual_correction_reach(steps.residual_options) : 0);
+  needs.halo = s.window / 2 + kMissingWindow / 2 +
+               (steps.residual_correction ? residual_correction_halo(steps.residual_options) : 0);
   const int rows =
       trial.rows_at_once > 0 ? trial.rows_at_once : rows_that_fit(device.info(), crn.width, crn.height, needs);
   EstimatorResult result = in_bands(crn, independent, needs, rows, [&](const GroupedImage& a, const GroupedImage& b) {

@@ -47,8 +47,8 @@ class MeanDenoising {
     MixedDenoising out;
     MixedRows whole;
     std::vector<CandidateMaker> makers;
-    const int reach = mixed_reach(CandidateBase::kMean, has_network(), kMeanReach, request_.weighting);
-    for (const RowBand& band : bands(reach, 0, height_)) {
+    const int halo = mixed_halo(CandidateBase::kMean, has_network(), kMeanHalo, request_.weighting);
+    for (const RowBand& band : bands(halo, 0, height_)) {
       RowsOnDevice& rows = with_candidates(band);
       makers = rows.makers();
       append(rows.mix(everywhere), band.skipped, band.y, band.n, height_, whole);
@@ -64,9 +64,9 @@ class MeanDenoising {
  private:
   bool has_network() const { return static_cast<bool>(request_.network); }
 
-  std::vector<RowBand> bands(int reach, int first, int end) const {
+  std::vector<RowBand> bands(int halo, int first, int end) const {
     if (rows_at_once_ >= height_) return {{0, height_, first, first, end - first}};
-    return bands_of(height_, rows_at_once_, reach, first, end);
+    return bands_of(height_, rows_at_once_, halo, first, end);
   }
 
   /// The rows of a band on the device, where those of the last one stay until others are asked for.
@@ -95,7 +95,7 @@ class MeanDenoising {
 
   void run_network() {
     std::array<Image, 3> noisy;
-    for (const RowBand& band : bands(kMeanReach, 0, height_)) {
+    for (const RowBand& band : bands(kMeanHalo, 0, height_)) {
       const std::array<Image, 3> part = on_device(band).noisy();
       for (size_t i = 0; i < part.size(); ++i) copy_rows(part[i], band.skipped, band.y, band.n, height_, noisy[i]);
     }
@@ -105,9 +105,9 @@ class MeanDenoising {
   std::vector<float> find_weights() {
     std::vector<NormalRow> all;
     std::vector<CandidateMaker> makers;
-    const int reach = candidates_reach(CandidateBase::kMean, has_network(), kMeanReach);
+    const int halo = candidates_halo(CandidateBase::kMean, has_network(), kMeanHalo);
     for (const auto& [first, end] : sampled_rows(request_.independent.width, height_))
-      for (const RowBand& band : bands(reach, first, end)) {
+      for (const RowBand& band : bands(halo, first, end)) {
         RowsOnDevice& rows = with_candidates(band);
         makers = rows.makers();
         const std::vector<NormalRow> part = rows.normal_rows(band.skipped, band.skipped + band.n);
@@ -141,8 +141,7 @@ MixedDenoising mix_mean(Device& device, const MeanMixture& request, const Trial&
   BandNeeds needs;
   needs.bytes_per_pixel = bytes_of_mean(image.groups);
   needs.largest_buffer_per_pixel = largest_buffer_of_mean(image.groups);
-  const int reach =
-      mixed_reach(CandidateBase::kMean, static_cast<bool>(request.network), kMeanReach, request.weighting);
+  const int halo = mixed_halo(CandidateBase::kMean, static_cast<bool>(request.network), kMeanHalo, request.weighting);
   int rows =
       trial.rows_at_once > 0 ? trial.rows_at_once : rows_that_fit(device.info(), image.width, image.height, needs);
   MeanDenoising denoising(device, request, trial);
@@ -150,7 +149,7 @@ MixedDenoising mix_mean(Device& device, const MeanMixture& request, const Trial&
     try {
       return denoising.run(rows);
     } catch (const device::Failure& failure) {
-      if (failure.kind() != device::FailureKind::kMemory || rows < 2 * reach) throw;
+      if (failure.kind() != device::FailureKind::kMemory || rows < 2 * halo) throw;
       rows = std::min(rows, image.height) / 2;
     }
   }

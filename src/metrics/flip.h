@@ -26,7 +26,7 @@ using VisitImages = std::function<void(const std::function<void(const Image&)>&)
 FlipExposures flip_exposures(const VisitImages& visit);
 
 /// Radius in rows of the neighbourhood that FLIP of a pixel depends on, at kFlipPixelsPerDegree.
-inline constexpr int kFlipReach = 10;
+inline constexpr int kFlipHalo = 10;
 
 /// HDR-FLIP per pixel: the maximum of LDR-FLIP over exposures, tone mapped with the ACES curve. Finite linear RGB.
 Image flip_hdr(const Image& image, const Image& reference, const FlipExposures& exposures,

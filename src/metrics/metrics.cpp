@@ -179,8 +179,8 @@ class ErrorOfPixels {
 
   /// Reads a band; for FLIP, also the rows around it.
   const ComparedRows::Band& move_to(int first_row, int n_rows) {
-    const int reach = metric_ == Metric::kFlip ? kFlipReach : 0;
-    const int first = std::max(first_row - reach, 0), end = std::min(first_row + n_rows + reach, rows_.height());
+    const int halo = metric_ == Metric::kFlip ? kFlipHalo : 0;
+    const int first = std::max(first_row - halo, 0), end = std::min(first_row + n_rows + halo, rows_.height());
     band_ = rows_.rows(first, end - first);
     offset_ = static_cast<size_t>(first_row - first) * rows_.width();
     first_value_ = 3 * static_cast<uint64_t>(first) * rows_.width();

@@ -21,7 +21,7 @@ constexpr float kSignificant = 3;    // standard errors
 constexpr float kMinCells = 20;      // similar cells: fewer determine their noise too poorly
 constexpr float kPixels = kBiasCell * kBiasCell;
 constexpr float kMinRelative = 1e-4f;  // relative to the brightness: smaller values are rounding errors
-static_assert(kBiasReach >= (kBorder + 1) * kBiasCell);
+static_assert(kBiasHalo >= (kBorder + 1) * kBiasCell);
 
 /// Planes of cells: guides of both halves (kFar where no pixel is valid), sums of M - h for both, half the square of
 /// their difference, the same with the weight of relMSE, number of valid pixels.

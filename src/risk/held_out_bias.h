@@ -35,7 +35,7 @@ struct HeldOutBiasInput {
 /// Cells are aligned to multiples of this.
 inline constexpr int kBiasCell = 4;
 /// Radius of influence of the images on a pixel's bias, in rows or columns.
-inline constexpr int kBiasReach = 8 * kBiasCell;
+inline constexpr int kBiasHalo = 8 * kBiasCell;
 
 /// The significant bias of each value, positive if the image is too bright, in linear radiance; for images made from
 /// half of the samples, so that of the whole image is at most as large. Bit-identical for any number of threads.

@@ -138,7 +138,7 @@ Method with_held_out_rows(const Method& base) {
   method.memory.of_halves = (2 * (3 + 6) + 6) * sizeof(float);
   method.memory.of_halves_per_group = 3 * sizeof(float);
   method.memory.groups_for_halves = 2 * base.min_groups;
-  if (base.reach >= 0) method.reach += kBiasReach;
+  if (base.halo >= 0) method.halo += kBiasHalo;
   std::get<PassPair>(method.passes).image = [base](const GroupedImage& crn, const GroupedImage& independent,
                                                    const MethodSettings& settings) {
     return image_with_rows(base, crn, independent, settings);

@@ -43,7 +43,7 @@ struct HeldOutParts {
   std::vector<HeldOutRow> rows;  ///< sums over each row
 };
 /// Radius of influence of the input on a pixel, in rows. Cells are aligned to multiples of kResidualCell.
-inline constexpr int kHeldOutReach = 32;
+inline constexpr int kHeldOutHalo = 32;
 HeldOutParts held_out_parts(const HeldOutInput& input);
 
 /// The estimated standard error of an image that the same method made from both halves. These determine its size; its

@@ -39,9 +39,9 @@ class WeighingNetwork {
   std::vector<Convolution> layers_;
 };
 
-/// Rows start at a multiple of kWeighingRows pixels; kWeighingReach rows from those that are missing, the bits are
+/// Rows start at a multiple of kWeighingRows pixels; kWeighingHalo rows from those that are missing, the bits are
 /// those of the whole image.
-inline constexpr int kWeighingRows = 8, kWeighingReach = 56;
+inline constexpr int kWeighingRows = 8, kWeighingHalo = 56;
 
 /// Bilinear interpolation between the shares of cells.
 class PixelShares {

@@ -105,7 +105,7 @@ TEST(Weighing, OfRowsHasTheBitsOfTheWhole) {
   const WeighingNetwork& network = *WeighingNetwork::find(kFilters);
   const Image all = weighed(whole.input(), network.shares(whole.input()));
   const Image part = weighed(rows.input(), network.shares(rows.input()));
-  for (int y = kWeighingReach; y < kRows - kWeighingReach; ++y)
+  for (int y = kWeighingHalo; y < kRows - kWeighingHalo; ++y)
     for (int x = 0; x < 50; ++x) ASSERT_EQ(part.pixel(x, y)[0], all.pixel(x, y + kFirst)[0]) << x << ", " << y;
 }
 
