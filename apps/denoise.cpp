@@ -179,9 +179,9 @@ Denoised denoise_by_network(const Options& o, const Task& task, ProgressLine& pr
     result.result.aovs[alpha] = as_alpha(denoised(values));
   result.attributes = new_attributes(o);
   result.attributes["covary:denoiser"] = "Open Image Denoise " + denoiser_info(o.denoiser()).version;
-  result.report = [=, width = image.image.width, height = image.image.height, seconds = watch.seconds(),
-                   text = guided] {
-    fmt::print(stderr, "{}{}: {} x {}, {}, in {:.2f} s\n", o.output, task.text(), width, height, text, seconds);
+  result.report = [=, width = image.image.width, height = image.image.height, seconds = watch.seconds()] {
+    fmt::print(stderr, "{}{}: {} x {}, {}, in {:.2f} s\n{}", o.output, task.text(), width, height, guided, seconds,
+               kErrorOfOneRender);
   };
   return result;
 }

@@ -181,7 +181,8 @@ void experiment(ExperimentCommand command) {
   const std::string scenes =
       command.scenes.empty() ? lab::scenes_folder(suite, command.suite, program_path()) : command.scenes;
   check_files(command, suite, scenes, command.output);
-  const lab::ExperimentOptions options = run_options(command, scenes, programs);
+  lab::ExperimentOptions options = run_options(command, scenes, programs);
+  if (!command.quiet && command.the_part.of == 0) tell_time(suite, options);
   lab::Results results = run_suite(suite, options, "", command.quiet);
   const size_t n_failures = results.failures.size();
   if (command.the_part.of == 0) {
@@ -221,7 +222,7 @@ void add_experiment(CLI::App& app) {
   command->add_option("--spp", o->spp, "Budgets in samples per pixel, separated by commas")
       ->transform(whole_number(1u, 1u << 30))
       ->delimiter(',');
-  command->add_option("--time", o->seconds, "Budgets in seconds, separated by commas")
+  command->add_option("--time", o->seconds, "Budgets in seconds, separated by commas; beside those of --spp")
       ->check(positive_number())
       ->delimiter(',');
   single(add_value(*command, "--crop", o->overrides.crop, "X,Y,WIDTH,HEIGHT",

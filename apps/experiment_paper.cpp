@@ -58,12 +58,13 @@ lab::Overrides overrides_of(const ExperimentCommand& command, const lab::Prepare
 }
 
 /// Says how long each part will take, and all of them.
-void print_estimates(const std::vector<lab::PreparedPart>& parts, const std::vector<lab::ExperimentOptions>& options) {
+void print_estimates(const std::vector<lab::PreparedPart>& parts, std::vector<lab::ExperimentOptions>& options) {
   lab::TimeEstimator estimator(options[0]);
   double seconds = 0;
   std::string left_out;
   for (size_t i = 0; i < parts.size(); ++i) {
     const lab::TimeEstimate estimate = estimator.of(parts[i].suite, options[i].max_pixels);
+    options[i].expected_seconds = estimate.seconds;
     const std::string finished = estimate.finished > 0 ? fmt::format(", {} made before", estimate.finished) : "";
     fmt::print(stderr, "{:14} about {:>8}, {} runs{}: {}\n", parts[i].part.names[0], format_duration(estimate.seconds),
                estimate.runs, finished, parts[i].part.title);

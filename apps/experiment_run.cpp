@@ -15,6 +15,7 @@
 #include "core/content_hash.h"
 #include "core/error.h"
 #include "core/stopwatch.h"
+#include "core/unfinished.h"
 #include "film/outputs.h"
 #include "imageio/output_file.h"
 #include "imageio/output_folder.h"
@@ -22,6 +23,7 @@
 #include "json_output.h"
 #include "lab/report_document.h"
 #include "lab/suite.h"
+#include "lab/time_estimate.h"
 #include "progress.h"
 #include "render_options.h"
 #include "version.h"
@@ -155,6 +157,24 @@ lab::ExperimentOptions run_options(const ExperimentCommand& command, const std::
   options.keep_passes = command.keep_passes;
   options.part = command.the_part;
   return options;
+}
+
+void tell_time(const lab::Suite& suite, lab::ExperimentOptions& options) {
+  constexpr double kLong = 180, kMinWork = 1e8;  // seconds, samples
+  const StopFlag stop;
+  lab::ExperimentOptions trial = options;
+  trial.stop = stop.token();
+  const lab::TimeEstimate estimate = lab::TimeEstimator(trial).of(suite, options.max_pixels, kMinWork);
+  if (trial.stop->load()) throw Unfinished(kInterrupted, "interrupted before the first run");
+  options.expected_seconds = estimate.seconds;
+  if (estimate.seconds < kLong) return;
+  const uint32_t reference = suite.reference.files.empty() ? suite.reference.spp : 0;
+  fmt::print(stderr,
+             "about {} for {}{}, by the speed of path tracing on cores without other work; --quick, "
+             "--resolution and {}take less\n",
+             format_duration(estimate.seconds), counted(static_cast<long>(estimate.runs - estimate.finished), "run"),
+             estimate.finished > 0 ? fmt::format(" ({} made before)", estimate.finished) : "",
+             reference > 0 ? fmt::format("--reference-spp (two of {}) ", reference) : "fewer --seeds ");
 }
 
 lab::Results run_suite(const lab::Suite& suite, lab::ExperimentOptions options, const std::string& name, bool quiet) {

@@ -46,6 +46,9 @@ void check_methods(const lab::Suite& suite, const lab::Programs& programs);
 lab::ExperimentOptions run_options(const ExperimentCommand& command, const std::string& scenes,
                                    const lab::Programs& programs);
 
+/// Says how long a suite will take, if that is minutes, and keeps it as the expected time.
+void tell_time(const lab::Suite& suite, lab::ExperimentOptions& options);
+
 /// Runs a suite, showing progress after `name`.
 lab::Results run_suite(const lab::Suite& suite, lab::ExperimentOptions options, const std::string& name, bool quiet);
 

@@ -28,6 +28,7 @@ namespace {
 /// scenes from 16 to 64 samples: docs/notes/denoising.md, docs/methods/iicv.md).
 constexpr double kFallOfMeans = 1, kFallOfPairs = 0.75, kFallOfDenoised = 0.5;
 /// Most of the time, and a render for which it matters.
+constexpr double kMuchOfTime = 0.6;  // of --time, that is used
 constexpr double kMostOfTheTime = 0.5, kLongSeconds = 5;
 
 double fall_of(const RenderOptions& options) {
@@ -131,6 +132,13 @@ void print_warnings(const RenderReport& report) {
   if (limit > 0 && result.seconds.limited > 1.1 * limit)
     fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for {}\n", limit, result.seconds.limited,
                samples_per_pixel_text(result.samples_per_pixel()));
+  if (result.of_time && !result.interrupted && result.seconds.limited < kMuchOfTime * limit &&
+      report.options.request().until == 0)
+    fmt::print(
+        stderr,
+        "note: {:.2g} of --time {:g} s are left: by the trials, more samples did not fit; on a machine that does "
+        "other work, they may mislead\n",
+        limit - result.seconds.limited, limit);
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ from ._program import failure, run_program
 from ._result import AXES, new_axes
 from .errors import InputError, _warn
 from .film import Film
-from .progress import Line, Progress, ended, is_default, steps
+from .progress import Counted, Line, Progress, ended, is_default, is_watched, steps
 
 if TYPE_CHECKING:
     from ._result import FloatArray
@@ -223,20 +223,34 @@ def _program_of(name: str, method: Callable[..., Any]) -> str:
     return f"{name}={shlex.join([sys.executable, '-I', str(_CALL), name, identity])}"
 
 
-def _watcher(progress: Progress | None) -> Callable[[str], object] | None:
-    """What gets the program's lines, "[3/24, 0:10 left] room, iicv, …"."""
-    if is_default(progress):
-        return Line()
-    counted = steps(progress, "runs")
-    if counted is None:
-        return None
+class _Runs:
+    """Counts the runs in the program's lines, "[3/24, 0:10 left] room, iicv, …"."""
 
-    def count(text: str) -> None:
+    def __init__(self, counted: Counted) -> None:
+        self._counted, self._told = counted, (-1, -1)
+
+    def __call__(self, text: str) -> None:
         found = re.match(r"\[(\d+)/(\d+)", text)
         if found:
-            counted(int(found[1]), int(found[2]))
+            self._tell(int(found[1]), int(found[2]))
 
-    return count
+    def end(self) -> None:
+        """All are there."""
+        total = max(self._told[1], 0)
+        self._tell(total, total)
+
+    def _tell(self, done: int, total: int) -> None:
+        if (done, total) != self._told:
+            self._counted(done, total)
+        self._told = done, total
+
+
+def _watcher(progress: Progress | None) -> Line | _Runs | None:
+    """What gets the program's lines: shows them, or where nobody watches tells the numbers of runs."""
+    if is_default(progress) and is_watched():
+        return Line()
+    counted = steps(progress, "runs")
+    return None if counted is None else _Runs(counted)
 
 
 _SUITE = "the name of a suite, the file of one or of a scene, or a suite as a dictionary"
@@ -289,5 +303,7 @@ def experiment(suite: str | PathLike[str] | dict[str, Any], output: str | PathLi
                                           *(options or []), progress=watcher)
     if code:
         raise failure(code, errors.replace(f"{made_file}:", "suite:"), InputError)
+    if isinstance(watcher, _Runs):
+        watcher.end()
     made = Path(output)
     return Experiment(made, json.loads((made / "results.json").read_text(encoding="utf-8")))

@@ -9,14 +9,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _covary
-from ._arguments import checked, instance, optional, path, real
-from .errors import Error
+from ._arguments import checked, flag, instance, optional, path, real
+from .errors import Error, UsageError
 
 if TYPE_CHECKING:
     import numpy
     from numpy.typing import NDArray
 
     FloatArray = NDArray[numpy.float32]
+
+
+_SAVE = "Result.save()"  # covary:command of its files begins with it, as with the name of a command
 
 
 AXES = optional(instance("matplotlib's Axes", lambda value: hasattr(value, "imshow")))
@@ -80,10 +83,20 @@ class Result:
     bias_share: float | None
     risks: dict[str, float]
 
-    @checked(path=path)
-    def save(self, path: str | PathLike[str]) -> None:
+    @checked(path=path, overwrite=flag)
+    def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Writes the image in the format of the extension: .exr .pfm .tif .hdr .png .jpg. EXR also holds std_error,
-        bias, aovs and the predicted error, and of a render its seed and its scene's hash."""
+        bias, aovs and the predicted error, and of a render its seed and its scene's hash.
+
+        overwrite: replace any file. Without it only what save() wrote is replaced: EXR files that say so, and PNG, TIFF
+        and JPEG files that are covary's.
+
+        Raises UsageError for another file of this name, and IoError.
+        """
+        file = Path(path)
+        if not overwrite and file.is_file() and not _covary.is_made_by(fspath(path), _SAVE):
+            raise UsageError(f"path: '{fspath(path)}' already exists, and save() did not make it; give another name, "
+                             "or overwrite=True to replace it")
         attributes = {f"covary:{name}": value for name, value in self._attributes().items()}
         if Path(path).suffix.lower() == ".exr":
             _covary.write_result(fspath(path), self.image, self.std_error, self.bias, self.aovs, attributes)
@@ -92,7 +105,7 @@ class Result:
 
     def _attributes(self) -> dict[str, str]:
         """Of files, as programs write them."""
-        known = {"estimator": self.estimator}
+        known = {"estimator": self.estimator, "command": f"covary {_SAVE} of Python"}
         if self.samples_per_pixel is not None:
             known["samples"] = f"{self.samples_per_pixel:g}"
         if self.predicted_bounds is not None:

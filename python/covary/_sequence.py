@@ -11,6 +11,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from . import _covary
 from ._arguments import Rule, check_names, checked, empty_or, flag, instance, optional, path, real, text, whole
 from ._combine import DENOISE, PROGRESS
 from ._options import DEFAULT, option_texts, text_options
@@ -60,7 +61,8 @@ def _watch(files: list[Path], since: float, keeps: bool, progress: Counted,
     shown = -1
     while True:
         is_last = end.wait(_LOOK_SECONDS)
-        done = sum(file.exists() and (keeps or file.stat().st_mtime >= since) for file in files)
+        done = sum(file.exists() and (keeps or file.stat().st_mtime >= since) and _covary.is_complete_file(str(file))
+                   for file in files)
         if done != shown:
             progress(done, len(files))
             shown = done

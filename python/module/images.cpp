@@ -12,6 +12,7 @@
 #include "denoising/denoised_references.h"
 #include "film/image_file.h"
 #include "film/image_writer.h"
+#include "film/outputs.h"
 #include "metrics/metrics.h"
 #include "python/module/arrays.h"
 #include "python/module/bindings.h"
@@ -118,6 +119,8 @@ nb::object denoised(nb::object image, nb::object albedo, nb::object normal, cons
 
 void bind_images(nb::module_& module) {
   using namespace nb::literals;
+  module.def("is_made_by", &is_made_by, "path"_a, "command"_a,
+             nb::sig("def is_made_by(path: str, command: str) -> bool"));
   module.def("read_image", &read, "path"_a, "layer"_a, "accept_changed"_a = false,
              nb::sig("def read_image(path: str, layer: str, accept_changed: bool = False) -> typing.Any"));
   module.def("write_image", &write, "path"_a, "image"_a.none(), "attributes"_a,

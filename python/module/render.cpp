@@ -266,6 +266,9 @@ void bind_render(nb::module_& module) {
               "of_estimator: dict[str, str], films_only: bool, threads: int, progress: typing.Any, page: Page | None, "
               "step: typing.Any) "
               "-> dict[str, typing.Any]"));
+  module.def(
+      "is_complete_file", [](const std::string& path) { return made_file(path).complete; }, "path"_a,
+      nb::sig("def is_complete_file(path: str) -> bool"));
   module.def("check_output", &check_output, "path"_a, nb::sig("def check_output(path: str) -> None"));
   module.def("image_of_films", &image_of_films, "values"_a, "of_estimator"_a, "films"_a, "aovs"_a,
              nb::sig("def image_of_films(values: dict[str, str], of_estimator: dict[str, str], films: dict[str, Film], "

@@ -5,9 +5,12 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
+#include <string>
 
 #include "combine/light_film.h"
 #include "combine/registry.h"
+#include "combine/result_file.h"
 #include "core/error.h"
 #include "denoising/mixed_denoising.h"
 #include "denoising/network_memory.h"
@@ -46,6 +49,31 @@ TEST(Combine, PredictsTheErrorOfTheMeanInBands) {
   const double whole = predicted_relmse(mean_of_groups(images.independent.view()));
   EXPECT_GT(whole, 0);
   for (const int rows : {7, kHeight, 2 * kHeight}) EXPECT_NEAR(predicted_relmse_of_mean(source, rows), whole, 1e-12);
+}
+
+TEST(Combine, PlacesImagesInMemoryInTheWholeFrame) {
+  const test::Grouped image = test::independent_image(kWidth, kHeight, kGroups, 1);
+  const ImagePlace place = source_of(image.view(), {.name = "mine"}).origin.place;
+  EXPECT_TRUE(place == (ImagePlace{kWidth, kHeight, {0, 0, kWidth, kHeight}}));
+  const ImageOrigin turned{.name = "mine", .place = {kHeight, kWidth, {0, 0, kHeight, kWidth}}};
+  EXPECT_EQ(message_of([&] { source_of(image.view(), turned); }, ErrorCode::kUsage),
+            "mine: 40 x 50 pixels, but its place has 50 x 40");
+}
+
+TEST(Combine, WritesResultsInTheirPlaceAsExr) {
+  EstimatorResult result;
+  result.estimate = Image(kWidth, kHeight, 3);
+  std::map<std::string, Image> none;
+  const ImagePlace turned{kHeight, kWidth, {0, 0, kHeight, kWidth}}, place = origin("").place;
+  EXPECT_EQ(message_of([&] { write_result("x.exr", turned, {}, result, none); }, ErrorCode::kUsage),
+            "'x.exr': the place has 50 x 40 pixels, the image 40 x 50");
+  EXPECT_TRUE(contains(message_of([&] { write_result("x.png", place, {}, result, none); }, ErrorCode::kUsage),
+                       "results are EXR files"));
+}
+
+TEST(Combine, NamesAnEmptyImage) {
+  EXPECT_EQ(message_of([] { source_of(GroupedImage{}, {.name = "mine"}); }, ErrorCode::kUsage),
+            "mine: the image is empty: 0 x 0 pixels, 0 groups, no data");
 }
 
 TEST(Combine, NeedsAnEstimator) {

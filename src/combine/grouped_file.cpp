@@ -56,6 +56,8 @@ double samples_per_pixel(const ExrFile& file, const std::string& path) {
   return value;
 }
 
+std::string number_of(double samples) { return samples > 0 ? fmt::format("{:g}", samples) : "an unknown number of"; }
+
 /// "group07" -> ("group", 7); number -1 if there are no trailing digits.
 std::pair<std::string, int> split_number(const std::string& name) {
   size_t digits = name.size();
@@ -171,8 +173,8 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
 void GroupedFile::take_film_facts(const std::string& path, const ExrFile& file, bool may_be_film) {
   const double samples = samples_per_pixel(file, path);
   if (files_.size() > 1 && samples != samples_of_group_)
-    fail_input(path, fmt::format("has {} samples per pixel, {} {}; render all with the same number ({})", samples,
-                                 source_.files[files_.size() - 2], samples_of_group_,
+    fail_input(path, fmt::format("has {} samples per pixel, {} {}; render all with the same number ({})",
+                                 number_of(samples), source_.files[files_.size() - 2], number_of(samples_of_group_),
                                  where_to_set(RenderSetting::kSamples, renderer())));
   samples_of_group_ = samples;
   samples_ += samples;

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "combine/grouped_source.h"
 
+#include <fmt/format.h>
+
 #include <memory>
 #include <numeric>
 #include <utility>
+
+#include "core/error.h"
+#include "core/number_text.h"
 
 namespace covary {
 
@@ -29,9 +34,18 @@ GroupedSource source_of(const GroupedFile& file) {
 }
 
 GroupedSource source_of(const GroupedImage& image, ImageOrigin origin) {
+  if (image.width < 1 || image.height < 1 || image.groups < 1 || !image.data)
+    throw Error(ErrorCode::kUsage, fmt::format("{}: the image is empty: {} x {} pixels, {}{}", origin.name, image.width,
+                                               image.height, counted(image.groups, "group"),
+                                               image.data ? "" : ", no data"));
   GroupedSource source;
   source.origin = std::move(origin);
   source.width = image.width, source.height = image.height, source.groups = image.groups;
+  ImagePlace& place = source.origin.place;
+  if (place.frame_width == 0) place = {image.width, image.height, {0, 0, image.width, image.height}};
+  if (place.window.width != image.width || place.window.height != image.height)
+    throw Error(ErrorCode::kUsage, fmt::format("{}: {} x {} pixels, but its place has {} x {}", source.origin.name,
+                                               image.width, image.height, place.window.width, place.window.height));
   GroupedImage whole = image;  // its rows know the mean count of the whole
   if (image.counts && image.mean_count == 0) {
     const size_t n_pixels = static_cast<size_t>(image.width) * image.height;

@@ -23,7 +23,8 @@ struct GroupedSource {
 
 /// `file` must outlive the source.
 GroupedSource source_of(const GroupedFile& file);
-/// The memory that `image` refers to must outlive the source.
+/// The memory that `image` refers to must outlive the source. An origin without a place: of the whole frame. Throws
+/// Error(kUsage) for an empty image, and for a place of another size.
 GroupedSource source_of(const GroupedImage& image, ImageOrigin origin);
 
 }  // namespace covary

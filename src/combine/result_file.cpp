@@ -10,8 +10,10 @@
 #include <set>
 #include <sstream>
 
+#include "core/error.h"
 #include "film/exr_copy.h"
 #include "film/film_file.h"
+#include "film/image_writer.h"
 
 namespace covary {
 namespace {
@@ -129,6 +131,15 @@ std::map<std::string, std::string> prediction_attributes(const std::optional<Pre
 std::vector<std::string> write_result(const std::string& path, const ImagePlace& place,
                                       const std::map<std::string, std::string>& attributes, EstimatorResult& result,
                                       std::map<std::string, Image>& aovs, const ResultSource& source) {
+  const CropWindow& window = place.window;
+  if (window.width != result.estimate.width || window.height != result.estimate.height)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("'{}': the place has {} x {} pixels, the image {} x {}", path, window.width, window.height,
+                            result.estimate.width, result.estimate.height));
+  if (const std::string ending = lower_extension(path); !ending.empty() && ending != ".exr")
+    throw Error(ErrorCode::kUsage, fmt::format("'{}': results are EXR files (.exr); write_image() writes pictures of "
+                                               "other formats",
+                                               path));
   std::map<std::string, std::string> all = attributes;
   const auto predicted = predicted_error(result, std::numeric_limits<double>::infinity(), 0);
   for (const auto& [key, value] : prediction_attributes(predicted)) all["covary:" + key] = value;

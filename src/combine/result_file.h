@@ -22,7 +22,8 @@ std::map<std::string, std::string> prediction_attributes(const std::optional<Pre
 /// Writes R, G, B, if there is an error estimate StdError.R, .G, .B and Bias.R, .G, .B, and the auxiliary images by
 /// name, with string attributes; if `source` has files, as a new version of the first one. Its alpha is the mean over
 /// the files, as the picture is; statistics of its samples by covary are left out. The file appears under its name only
-/// when complete. Returns what could not be kept, one sentence each. Throws Error(kIo), and like ExrFile.
+/// when complete. Returns what could not be kept, one sentence each. Throws Error(kUsage) for another ending than .exr
+/// or a place of another size than the image, Error(kIo), and like ExrFile.
 std::vector<std::string> write_result(const std::string& path, const ImagePlace& place,
                                       const std::map<std::string, std::string>& attributes, EstimatorResult& result,
                                       std::map<std::string, Image>& aovs, const ResultSource& source = {});

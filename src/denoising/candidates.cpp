@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "denoising/candidates.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <deque>
 #include <functional>
 #include <memory>
 #include <utility>
 
+#include "core/error.h"
 #include "denoising/mirrored_halves.h"
 #include "filters/residual_correction.h"
 
@@ -223,9 +226,22 @@ CandidateMaker filtered_candidates(const Features& features, CandidateBase base,
   return maker;
 }
 
-void check_features(const Features& features) {
-  for (size_t i = 0; i < feature::kCount; ++i)
-    if (const Image* image = features.*kImagesOfFeatures[i]) check_feature(kAuxiliaryFeatures[i].name, *image);
+void check_features(const Features& features, int width, int height) {
+  for (size_t i = 0; i < feature::kCount; ++i) {
+    const Image* image = features.*kImagesOfFeatures[i];
+    if (!image) continue;
+    const char* const name = kAuxiliaryFeatures[i].name;
+    const size_t n_values = 3 * static_cast<size_t>(width) * static_cast<size_t>(height);
+    if (image->width != width || image->height != height || image->channels != 3 || image->data.size() != n_values)
+      throw Error(
+          ErrorCode::kInput,
+          fmt::format("{} has {} x {} pixels of {} channels and {} values, the image {} x {} pixels; expected "
+                      "the same size, 3 channels and {} values",
+                      name, image->width, image->height, image->channels, image->data.size(), width, height, n_values));
+    check_feature(name, *image);
+  }
+  if (features.normal && !features.albedo)
+    throw Error(ErrorCode::kInput, "a normal without an albedo is not used; give both");
 }
 
 Features network_features(const Features& features) {

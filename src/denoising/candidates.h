@@ -91,8 +91,9 @@ std::vector<std::string> filter_names(const Features& features, CandidateBase ba
 /// kRegressionCell; kCandidateHalo rows from those that are missing, the bits are those of the whole.
 CandidateMaker filtered_candidates(const Features& features, CandidateBase base = CandidateBase::kPair,
                                    FilterKinds kinds = FilterKinds::kNlMeans, const WantedRows& wanted = {});
-/// Throws Error(kInput) for auxiliary images with values that cannot be used (check_feature() of denoise.h).
-void check_features(const Features& features);
+/// Throws Error(kInput) for auxiliary images that cannot be used: of another size than the image, a normal alone,
+/// values that are not finite (check_feature() of denoise.h).
+void check_features(const Features& features, int width, int height);
 /// The features for a neural network: those seen in mirrors and through glass, if available.
 Features network_features(const Features& features);
 

@@ -107,6 +107,14 @@ bool can_be_mixed(const GroupedImage& image) {
          std::all_of(image.counts, image.counts + n_pixels, [](uint32_t n) { return n >= kMinMixedSamples; });
 }
 
+/// Why an image that can't be mixed has no error.
+std::string why_unknown(const GroupedImage& image) {
+  if (image.groups > 1 || (image.counts && mean_samples(image) < kMinMixedSamples))
+    return fmt::format("with fewer than {} samples per pixel denoised images cannot be judged", kMinMixedSamples);
+  if (image.counts) return "with all samples in one group (`groups`) denoised images cannot be judged";
+  return "one render alone does not tell its noise, which another one of a different seed would";
+}
+
 /// The candidate that was best with few samples in measurements.
 MixedDenoising single_candidate(const GroupedImage& independent, const std::vector<CandidateMaker>& makers,
                                 std::span<const Layer> layers) {
@@ -118,10 +126,8 @@ MixedDenoising single_candidate(const GroupedImage& independent, const std::vect
   out.result.std_error = Image();
   for (size_t i = 0; i < parts.valid.size(); ++i)
     if (parts.valid[i]) std::copy_n(&set.candidates[best].data[3 * i], 3, &out.result.estimate.data[3 * i]);
-  out.result.note = fmt::format(
-      "with fewer than {} samples per pixel denoised images cannot be judged: the picture is the candidate '{}', and "
-      "its error is unknown",
-      kMinMixedSamples, out.names[best]);
+  out.result.note = fmt::format("{}: the picture is the candidate '{}', and its error is unknown",
+                                why_unknown(independent), out.names[best]);
   out.weights.assign(set.candidates.size(), Image(independent.width, independent.height, 1));
   std::fill(out.weights[best].data.begin(), out.weights[best].data.end(), 1.0f);
   out.candidates = std::move(set.candidates);
@@ -160,8 +166,8 @@ void tell_that_made_here(const MixedDenoisingOptions& options, const char* what,
 
 Run run_of_pair(const Method& base, const MixedDenoisingOptions& options, bool with_oidn) {
   return [=](const Samples& samples, const MethodSettings& settings, bool stages) {
-    check_features(settings.features);
     const auto& [crn, independent] = samples;
+    check_features(settings.features, independent.width, independent.height);
     if (std::min(crn.groups, independent.groups) < 2 * base.min_groups) {
       MixedDenoising out;
       out.result = base.image(samples, settings);
@@ -198,7 +204,7 @@ Run run_of_pair(const Method& base, const MixedDenoisingOptions& options, bool w
 Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
   return [=](const Samples& samples, const MethodSettings& settings, bool stages) {
     const GroupedImage& independent = samples.independent;
-    check_features(settings.features);
+    check_features(settings.features, independent.width, independent.height);
     const FilterKinds kinds = kinds_of_mean(with_oidn);
     const auto here = [&]() -> MixedDenoising {
       std::vector<CandidateMaker> makers;
@@ -278,7 +284,7 @@ void allow_rows(const Method& base, const MixedDenoisingOptions& options, bool w
   method.halo = rows_halo(rows);
   method.memory.of_whole = bytes_of_whole(with_oidn);
   method.image_in_rows = [rows, options](const SamplesInRows& image, const MethodSettings& settings) {
-    check_features(settings.features);
+    check_features(settings.features, image.width, image.height);
     MethodImage result = denoise_in_rows(image, settings, rows);
     tell_that_made_here(options, "images that are read in parts", result);
     return result;

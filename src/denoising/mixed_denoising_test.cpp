@@ -2,11 +2,13 @@
 // --denoise as a whole, on synthetic images; planted candidates; unusual pictures.
 #include "denoising/mixed_denoising.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 
 #include "combine/registry.h"
@@ -223,6 +225,39 @@ TEST(MixedDenoising, OfASinglePassSaysWhenSamplesAreTooFewToJudge) {
     const double before = square_error(mean_of_groups(in.independent.view()).estimate);
     EXPECT_LT(square_error(result.estimate), samples == 1 ? 1.001 * before : 0.8 * before) << samples;
   }
+}
+
+TEST(MixedDenoising, OfOneRenderSaysThatAnotherOneTellsItsNoise) {
+  const Inputs in(3, kWidth, kHeight, 1);
+  const EstimatorResult result = mean_denoiser(DenoiseMode::kError).image({{}, in.independent.view()}, {});
+  EXPECT_NE(result.note.find("one render alone does not tell its noise"), std::string::npos) << result.note;
+}
+
+/// All of them would be read beyond their ends, or where the image has something else.
+TEST(MixedDenoising, RefusesFeaturesOfAnotherSizeThanTheImage) {
+  const Inputs in(3);
+  const Image right(kWidth, kHeight, 3), half(kWidth / 2, kHeight / 2, 3), large(2 * kWidth, kHeight, 3);
+  const Image turned(kHeight, kWidth, 3), grey(kWidth, kHeight, 1);
+  Image cut(kWidth, kHeight, 3);
+  cut.data.resize(cut.data.size() / 2);
+  const auto message = [&](const Image* albedo, const Image* normal) {
+    MethodSettings settings;
+    settings.features.albedo = albedo, settings.features.normal = normal;
+    return test_support::message_of(
+        [&] {
+          mean_denoiser(DenoiseMode::kError).image({{}, in.independent.view()}, settings);
+        },
+        ErrorCode::kInput);
+  };
+  for (const Image* wrong : std::initializer_list<const Image*>{&half, &large, &turned, &grey, &cut}) {
+    EXPECT_EQ(message(wrong, &right).find("the albedo has "), 0u);
+    EXPECT_EQ(message(&right, wrong).find("the normal has "), 0u);
+  }
+  EXPECT_EQ(message(&half, &half),
+            fmt::format("the albedo has {} x {} pixels of 3 channels and {} values, the image "
+                        "{} x {} pixels; expected the same size, 3 channels and {} values",
+                        kWidth / 2, kHeight / 2, half.data.size(), kWidth, kHeight, right.data.size()));
+  EXPECT_EQ(message(nullptr, &right), "a normal without an albedo is not used; give both");
 }
 
 TEST(MixedDenoising, OfASinglePassDoesNotDependOnThreads) {

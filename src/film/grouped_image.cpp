@@ -70,9 +70,17 @@ void throw_if_any(const std::string& name, const std::vector<std::string>& probl
 
 void check_inputs(const GroupedImage& crn, const GroupedImage& independent, int min_crn_groups,
                   int min_independent_groups, std::vector<std::string>& problems) {
-  if (crn.width < 1 || crn.height < 1 || !crn.data) problems.push_back("the CRN image is empty");
-  if (independent.width < 1 || independent.height < 1 || !independent.data)
-    problems.push_back("the independent image is empty");
+  const auto check_not_empty = [&](const char* name, const GroupedImage& image) {
+    if (image.width < 1 || image.height < 1 || image.groups < 1 || !image.data)
+      problems.push_back(fmt::format("the {} is empty: {} x {} pixels, {}{}", name, image.width, image.height,
+                                     counted(image.groups, "group"), image.data ? "" : ", no data"));
+  };
+  if (crn.data == independent.data && crn.width == independent.width) {
+    check_not_empty("image", independent);
+    if (!problems.empty()) return;
+  }
+  check_not_empty("CRN image", crn);
+  check_not_empty("independent image", independent);
   if (crn.width != independent.width || crn.height != independent.height)
     problems.push_back(
         fmt::format("the CRN image is {} x {} and the independent image {} x {}; they must have the same size",

@@ -350,6 +350,7 @@ Shape "disk"
 MediumInterface "mist" ""
 Shape "disk" Shape "disk"
 LightSource "projection"
+Material "coateddiffuse" "rgb reflectnace" [1 1 1] Shape "sphere"
 )");
   for (const char* message : {
            "scene.pbrt:1:1: 'screenwindow' is empty",
@@ -369,6 +370,8 @@ LightSource "projection"
            "scene.pbrt:18:1: MakeNamedMedium \"smoke\" is of the type 'vapour'; supported: 'cloud'",
            "scene.pbrt:21:1: no medium has the name 'mist'",
            "scene.pbrt:23:1: LightSource \"projection\" has no 'filename'",
+           "scene.pbrt:24:26: parameter 'reflectnace' of Material \"coateddiffuse\" is not supported; did you mean "
+           "'reflectance'?",
        })
     EXPECT_TRUE(contains(found, message)) << message << "\n" << found;
   // One cause, one message, however many shapes it stops.

@@ -18,6 +18,7 @@
 #include "film/outputs.h"
 #include "lab/measure.h"
 #include "lab/process.h"
+#include "lab/run_clock.h"
 #include "lab/runner.h"
 #include "lab/scene_images.h"
 #include "metrics/provenance.h"
@@ -26,23 +27,6 @@ namespace covary::lab {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Estimates the remaining time from the duration of the runs actually made.
-class Clock {
- public:
-  void add_planned(double work) { work_left_ += work, ++runs_left_; }
-  void remove_planned(double work) { work_left_ -= work, --runs_left_; }
-  void took(double work, double seconds) { work_ += work, seconds_ += seconds, ++runs_; }
-  double seconds_left() const {
-    if (runs_ == 0) return 0;
-    return work_ > 0 ? work_left_ * seconds_ / work_
-                     : static_cast<double>(runs_left_) * seconds_ / static_cast<double>(runs_);
-  }
-
- private:
-  double work_left_ = 0, work_ = 0, seconds_ = 0;
-  size_t runs_left_ = 0, runs_ = 0;
-};
 
 /// "3-of-8", or "" for the whole.
 std::string part_name(const Part& part) {
@@ -61,7 +45,8 @@ class Experiment {
       : options_(options),
         reader_(options.reader ? options.reader : std::make_shared<SceneReader>(options.program, options.stop)),
         cache_(options.cache_folder, part_name(options.part)),
-        runner_(cache_, options.program, options.threads, options.stop) {
+        runner_(cache_, options.program, options.threads, options.stop),
+        clock_(options.expected_seconds) {
     results_.suite = suite;
   }
 
@@ -385,7 +370,7 @@ class Experiment {
   std::vector<bool> usable_;                         // per scene
   std::vector<std::vector<Run>> runs_, references_;  // per scene
   std::map<std::string, RunRecord> records_;         // by key
-  Clock clock_;
+  RunClock clock_;
   size_t done_ = 0, total_ = 0;
   size_t piece_ = 0;  // index of the next unit of work to divide among parts, over all scenes
 };

@@ -37,6 +37,7 @@ struct ExperimentOptions {
   std::shared_ptr<SceneReader> reader = nullptr;  ///< to share between experiments; null: one of its own
   bool keep_passes = false;
   Part part;                                ///< makes and keeps only this part's runs, and measures nothing
+  double expected_seconds = 0;              ///< TimeEstimate::seconds, told until a run has ended; 0: unknown
   const std::atomic<bool>* stop = nullptr;  ///< stops after the run in progress has saved its state
   std::function<void(const Progress&)> progress;
 };

@@ -28,6 +28,17 @@ CropWindow middle(const CropWindow& window) {
 
 }  // namespace
 
+double TimeEstimator::seconds_of(const Suite& suite, const std::vector<const Run*>& runs, const Speed& speed) {
+  double seconds = 0;
+  std::set<std::string> rendered;  // passes
+  for (const Run* run : runs) {
+    const double work = rendered.insert(run->passes_key).second ? run->work : 0;
+    const double budget = run->timed ? suite.budgets[run->budget].seconds : 0;
+    seconds += budget + work * speed.seconds_per_sample + speed.seconds_per_run;
+  }
+  return seconds;
+}
+
 TimeEstimator::TimeEstimator(const ExperimentOptions& options) : options_(options) {
   if (!options_.reader) options_.reader = std::make_shared<SceneReader>(options_.program, options_.stop);
 }
@@ -63,32 +74,36 @@ const TimeEstimator::Trial& TimeEstimator::trial_of(const Suite& suite, const Sc
   return trials_.emplace(key, std::move(trial)).first->second;
 }
 
-TimeEstimate TimeEstimator::of(const Suite& suite, int64_t max_pixels) {
+TimeEstimate TimeEstimator::of(const Suite& suite, int64_t max_pixels, double min_work) {
   throw_if_invalid(suite);
   const Cache cache(options_.cache_folder);
   const Runner runner(cache, options_.program, options_.threads, options_.stop);
   const auto stopped = [this] { return options_.stop && options_.stop->load(); };
   TimeEstimate estimate;
-  for (size_t s = 0; s < suite.scenes.size() && !stopped(); ++s) {
-    const ScenePlan plan = plan_scene(suite, s, options_.scenes_folder, max_pixels, options_.context, *options_.reader);
-    std::vector<const Run*> missing;
+  std::vector<ScenePlan> plans;
+  std::vector<std::vector<const Run*>> missing;
+  double work = 0;
+  for (size_t s = 0; s < suite.scenes.size() && !stopped(); ++s)
+    plans.push_back(plan_scene(suite, s, options_.scenes_folder, max_pixels, options_.context, *options_.reader));
+  for (const ScenePlan& plan : plans) {
+    missing.emplace_back();
     for (const std::vector<Run>* runs : {&plan.references, &plan.runs})
       for (const Run& run : *runs) {
         ++estimate.runs;
-        runner.find(run) ? void(++estimate.finished) : missing.push_back(&run);
+        if (runner.find(run))
+          ++estimate.finished;
+        else
+          missing.back().push_back(&run), work += run.work;
       }
-    const Trial trial = plan.failure      ? Trial{std::nullopt, complaint(plan.failure->message)}
-                        : missing.empty() ? Trial{}
-                                          : trial_of(suite, plan.scene, runner);
+  }
+  for (size_t s = 0; s < plans.size() && !stopped(); ++s) {
+    const Trial trial = plans[s].failure     ? Trial{std::nullopt, complaint(plans[s].failure->message)}
+                        : missing[s].empty() ? Trial{}
+                        : work < min_work    ? Trial{Speed{}, ""}
+                                             : trial_of(suite, plans[s].scene, runner);
     if (!trial.failure.empty() && estimate.left_out.empty())
       estimate.left_out = suite.scenes[s].name + ": " + trial.failure;
-    if (!trial.speed) continue;
-    std::set<std::string> rendered;  // passes
-    for (const Run* run : missing) {
-      const double work = rendered.insert(run->passes_key).second ? run->work : 0;
-      const double budget = run->timed ? suite.budgets[run->budget].seconds : 0;
-      estimate.seconds += budget + work * trial.speed->seconds_per_sample + trial.speed->seconds_per_run;
-    }
+    if (trial.speed) estimate.seconds += seconds_of(suite, missing[s], *trial.speed);
   }
   return estimate;
 }

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "lab/experiment.h"
 
@@ -23,8 +24,9 @@ struct TimeEstimate {
 class TimeEstimator {
  public:
   explicit TimeEstimator(const ExperimentOptions& options);
-  /// max_pixels: as in ExperimentOptions. Throws what run_experiment() throws. The cache must not be in use.
-  TimeEstimate of(const Suite& suite, int64_t max_pixels);
+  /// max_pixels: as in ExperimentOptions. min_work: with fewer samples in all that are not finished, nothing is
+  /// rendered, and only time budgets count. Throws what run_experiment() throws. The cache must not be in use.
+  TimeEstimate of(const Suite& suite, int64_t max_pixels, double min_work = 0);
 
  private:
   struct Speed {
@@ -34,6 +36,7 @@ class TimeEstimator {
     std::optional<Speed> speed;
     std::string failure;
   };
+  static double seconds_of(const Suite& suite, const std::vector<const Run*>& runs, const Speed& speed);
   const Trial& trial_of(const Suite& suite, const SceneInstance& scene, const Runner& runner);
   Trial try_out(const Suite& suite, const SceneInstance& scene, uint32_t spp, const Runner& runner) const;
 

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <set>
+#include <sstream>
 #include <thread>
 #include <utility>
 
@@ -14,6 +16,7 @@
 #include "film/film_file.h"
 #include "film/image_file.h"
 #include "live/coarse.h"
+#include "plans/made_of.h"
 #include "risk/predicted_error.h"
 
 namespace covary {
@@ -46,11 +49,27 @@ std::string value_of(const std::map<std::string, std::string>& attributes, const
   return found == attributes.end() ? "" : found->second;
 }
 
+/// What a film shows: the scene, and in a sequence the camera's place and the time.
+std::string view_of(const std::map<std::string, std::string>& attributes) {
+  std::string view = value_of(attributes, film_key::kSceneHash);
+  std::istringstream lines(value_of(attributes, film_key::kMadeOf));
+  for (std::string line; std::getline(lines, line);)
+    if (line.starts_with(std::string(kMadeAtPlace) + "=") || line.starts_with(std::string(kMadeAtTime) + "="))
+      view += "\n" + line;
+  return view;
+}
+
+std::string waiting_for(const std::string& path) {
+  const bool is_file = fs::path(path).extension() == ".exr";
+  return fmt::format("waiting for '{}'{}", path,
+                     is_file || fs::exists(path) ? "" : ", a folder that does not exist yet");
+}
+
 }  // namespace
 
 LiveFiles::LiveFiles(int port, std::string path)
     : path_(std::move(path)), page_(port, path_, [](const Json&) { throw Error(ErrorCode::kUsage, "no buttons"); }) {
-  page_.say({{"kind", "files"}, {"pictures", Json::array()}, {"phase", "waiting for '" + path_ + "'"}});
+  page_.say({{"kind", "files"}, {"pictures", Json::array()}, {"phase", waiting_for(path_)}});
 }
 
 /// The newest ones, by name.
@@ -126,20 +145,22 @@ Json LiveFiles::picture(const std::string& id, const std::string& name, const Im
   return {{"id", id}, {"name", name}, {"label", label}};
 }
 
-/// The mean of all films, if they show the same pixels with different seeds.
+/// The mean of all films, if they show the same pixels of the same view with different seeds.
 Json LiveFiles::show_sum() {
   std::vector<const Film*> films;
   std::vector<std::string> seeds;
+  std::set<std::string> views;
   for (const auto& [path, followed] : followed_)
     if (followed.film) {
       films.push_back(&*followed.film);
+      views.insert(view_of(followed.attributes));
       seeds.push_back(value_of(followed.attributes, film_key::kSeed));
     }
   std::sort(seeds.begin(), seeds.end());
   const auto differs = [&](const Film* film) {
     return film->width() != films[0]->width() || film->height() != films[0]->height();
   };
-  if (films.size() < 2 || std::adjacent_find(seeds.begin(), seeds.end()) != seeds.end() ||
+  if (films.size() < 2 || views.size() > 1 || std::adjacent_find(seeds.begin(), seeds.end()) != seeds.end() ||
       std::any_of(films.begin(), films.end(), differs))
     return nullptr;
   const MeanAndError all = mean_of_films(films, nullptr);
@@ -158,7 +179,7 @@ void LiveFiles::show() {
   if (newest == followed_.end()) return page_.say({{"pictures", pictures}});
   const int width = newest->second.image.width, height = newest->second.image.height;
   page_.say({{"size", Json::array({width, height})}});
-  size_t number = 0;
+  size_t number = 0, place = 0;  // of the newest
   for (const auto& [path, followed] : followed_) {
     const size_t i = number++;
     if (!followed.problem.empty()) problems_.push_back(followed.problem);
@@ -169,8 +190,13 @@ void LiveFiles::show() {
                                       newest->first.filename().string()));
     else
       pictures.push_back(picture(fmt::format("file{}", i), path.stem().string(), image, followed.std_error));
+    if (path == newest->first && !pictures.empty()) place = pictures.size() - 1;
   }
-  if (Json sum = show_sum(); !sum.is_null()) pictures.insert(pictures.begin(), std::move(sum));
+  if (Json sum = show_sum(); !sum.is_null())
+    pictures.insert(pictures.begin(), std::move(sum));
+  else if (!pictures.empty())  // the newest first
+    std::rotate(pictures.begin(), pictures.begin() + static_cast<ptrdiff_t>(place),
+                pictures.begin() + static_cast<ptrdiff_t>(place) + 1);
   page_.say({{"pictures", pictures}});
 }
 

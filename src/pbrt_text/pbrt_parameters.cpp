@@ -105,6 +105,7 @@ void PbrtParameters::read_values(PbrtTokens& tokens, PbrtParameter& parameter) {
 }
 
 bool PbrtParameters::has(const std::string& name) const {
+  asked_.push_back(name);
   return std::ranges::any_of(parameters_, [&](const PbrtParameter& p) { return p.name == name; });
 }
 
@@ -241,6 +242,7 @@ void PbrtParameters::report_unknown(bool lenient) {
   asked_.erase(std::unique(asked_.begin(), asked_.end()), asked_.end());
   for (const PbrtParameter& parameter : parameters_) {
     if (parameter.used) continue;
+    std::erase(asked_, parameter.name);
     if (lenient || messages_->ignores_unknown())
       warn(fmt::format("has the parameter '{}', which is ignored", parameter.name));
     else

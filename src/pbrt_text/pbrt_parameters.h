@@ -92,7 +92,7 @@ class PbrtParameters {
   PbrtMessages* messages_;
   PbrtContext context_;
   std::vector<PbrtParameter> parameters_;
-  std::vector<std::string> asked_;
+  mutable std::vector<std::string> asked_;
 };
 
 }  // namespace covary

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What an interrupted render leaves, and the phase in which there is nothing to see yet: auxiliary images.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <filesystem>
 
@@ -15,6 +17,8 @@
 
 namespace covary {
 namespace {
+
+using test_support::contains, test_support::message_of;
 
 namespace fs = std::filesystem;
 using test_support::TemporaryFolder;
@@ -84,6 +88,16 @@ TEST(Interrupted, AFilmThatIsTheOutputSaysThatItIsNotComplete) {
   EXPECT_EQ(result.kept, request.output);
   EXPECT_EQ(read_film_attributes(request.output).at("complete"), "false");
   EXPECT_EQ(read_film(request.output).aovs.size(), kAuxiliaryFeatures.size());
+  const Film film = read_film(request.output);
+  const auto [fewest, most] = std::ranges::minmax(film.counts());
+  ASSERT_LT(fewest, most);
+  RenderRequest fewer = request;
+  fewer.resume = true, fewer.spp = most - 1;
+  EXPECT_TRUE(contains(
+      message_of([&] { render(scene, plain_plan(Sampling::kIndependent), fewer); }, ErrorCode::kInput),
+      fmt::format("was interrupted with {} to {} samples per pixel, this command asks for {}", fewest, most, most - 1)))
+      << "it would be called complete with unequal numbers";
+  EXPECT_EQ(read_film_attributes(request.output).at("complete"), "false");
   request.resume = true;
   EXPECT_TRUE(render(scene, plain_plan(Sampling::kIndependent), request).complete);
   EXPECT_EQ(read_film_attributes(request.output).at("complete"), "true");

@@ -182,6 +182,7 @@ bool PlanRun::render_phase(size_t index, double share) {
   state_.features = features();
   if (timed() && !in_rounds()) state_.seconds_left = seconds_left(index, share);
   set_targets(phase, passes.first(camera_passes(passes).size()));
+  if (request_.resume && !timed() && request_.until == 0) check_earlier_samples(camera_passes(passes));
   if (passes.back().plan.light) set_light_target(*state_.integrator, camera_passes(state_.passes), passes.back());
   for (Pass& pass : passes) pass.count = pass.settings.spp.reached(pass.film);
   if (index + 1 == plan_.phases.size() && !timed() && request_.until == 0) warn_of_other_samples(state_.budget);
@@ -302,6 +303,20 @@ void PlanRun::between_waves() {
   if (request_.checkpoint_seconds <= 0 || since_checkpoint_.seconds() < request_.checkpoint_seconds) return;
   unsaved_ = true;
   try_to_keep_films(false, "rendering continues, and the next checkpoint tries again");
+}
+
+/// Pixels with more samples than asked for stay as they are. An interrupted render would end with unequal numbers.
+void PlanRun::check_earlier_samples(std::span<const Pass> passes) const {
+  for (const Pass& pass : passes) {
+    if (pass.settings.spp.is_map() || pass.film.counts().empty()) continue;
+    const auto [fewest, most] = std::ranges::minmax(pass.film.counts());
+    if (most > pass.settings.spp.largest() && fewest < most)
+      throw Error(
+          ErrorCode::kInput,
+          fmt::format("`resume`: '{}' was interrupted with {} to {} samples per pixel, this command asks for {}; "
+                      "as many as before, or more, continue it, and `overwrite` replaces it",
+                      pass.path, fewest, most, pass.settings.spp.largest()));
+  }
 }
 
 void PlanRun::warn_of_other_samples(uint32_t asked) const {

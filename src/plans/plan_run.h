@@ -58,6 +58,7 @@ class PlanRun {
   void keep_films_of_failure() noexcept;
   std::span<Pass> films() { return result_.passes.empty() ? state_.passes : result_.passes; }
   void warn_of_other_samples(uint32_t asked) const;
+  void check_earlier_samples(std::span<const Pass> passes) const;
   void warn_of_missing_light() const;
   void warn_of_other_sampler() const;
   bool estimate();

@@ -86,8 +86,9 @@ struct RenderResult {
   std::string chosen;
   std::shared_ptr<const Integrator> integrator;  ///< of the last passes, with what it has learnt
   std::vector<Pass> passes;
-  /// If the film itself is the image, at most its standard error. Empty for a render interrupted before every pixel of
-  /// every film had samples.
+  /// If the film itself is the image, at most its standard error. Empty for an interrupted render in
+  /// which some pixel of a film has no samples, or whose image takes more than seconds (RenderCallbacks::whole_image
+  /// lets it take as long as it needs); picture() is the mean then.
   EstimatorResult image;
   std::optional<PredictedError> predicted;  ///< if there is a standard error
   double predicted_blocks = 0;              ///< of predicted_error.h, likewise

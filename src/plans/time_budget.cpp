@@ -27,7 +27,7 @@ uint32_t whole(double samples) { return static_cast<uint32_t>(std::clamp(samples
 double time_of_end(int height, double allowed, const std::function<double(int rows)>& trial) {
   const int few = std::min(height, kFewRows);
   double seconds = trial(few), used = seconds;
-  if (2 * used <= allowed) seconds = trial(few), used += seconds;
+  if (used <= 2 * allowed) seconds = trial(few), used += seconds;  // without what loads once, mostly faster
   const double more_rows = static_cast<double>(kMoreRows) / few;
   if (height <= kMoreRows || used + more_rows * seconds > allowed) return seconds * height / few;
   const double more = trial(kMoreRows);

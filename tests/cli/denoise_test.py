@@ -479,6 +479,8 @@ class Denoise(RenderTest):
         options = ("--estimator", "none", "--denoise", "error", *PLAIN)
         self.assertIn("fewer than 4 samples per pixel",
                       self.statistics("-o", "a.exr", *options, "--spp", "3")["note"])
+        self.assertIn("with all samples in one group (`groups`) denoised",
+                      self.statistics("-o", "c.exr", *options, "--spp", "5", "--groups", "1")["note"])
         facts = self.statistics("-o", "b.exr", *options, "--spp", "4")
         self.assertNotIn("note", facts)
         self.assertEqual(facts["samples_per_pixel"], 4)

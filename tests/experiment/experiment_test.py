@@ -341,6 +341,18 @@ class Resume(ExperimentTest):
         self.assertEqual(json.loads(info.stdout)["attributes"]["covary:complete"], "false")
         self.assertEqual(without_times(self.results(*long)), expected)
 
+    def test_long_ones_say_how_long(self):
+        """Before the first run, with what would take less; Ctrl-C ends it."""
+        pid, keyboard = terminal.start(self, self.command("--reference-spp", "1000000"), self.path)
+        wait_for(lambda: any(is_render(child) and b"1000000" in Path(f"/proc/{child}/cmdline").read_bytes() and
+                             catches(child, signal.SIGINT) for child in children(pid)))
+        os.write(keyboard, b"\x03")
+        shown, exit_code = terminal.finish(pid, keyboard)
+        self.assertEqual(exit_code, 130, shown)
+        self.assertRegex(shown, r"about [\d:]+ for \d+ runs, by the speed of path tracing on cores without other work; "
+                                r"--quick, --resolution and --reference-spp \(two of 1000000\) take less")
+        self.assertRegex(shown, r"\[0/\d+, [\d:]+ left\]")
+
     def test_optional_methods_are_left_out(self):
         """What the machine lacks is a warning for an optional method, and a failure for any other."""
         self.suite["budgets"], self.suite["seeds"] = [{"spp": 24}], 1

@@ -127,6 +127,12 @@ class LiveTest(unittest.TestCase):
         self.assertEqual(result.returncode, code, result.stderr)
         return self.pixels(name)
 
+    def render_frame(self, frame):
+        path = str(Path(ROOM).parent / "room-path.json")
+        subprocess.run([os.environ["COVARY"], "render", ROOM, "-o", "f_#.exr", "--resolution", f"{SIZE[0]}x{SIZE[1]}",
+                        "--frames", frame, "--camera-path", path, "--spp", "8", "--estimator", "none", "--quiet",
+                        "--no-preview"], cwd=self.folder, check=True, timeout=PATIENCE)
+
     def pixels(self, name):
         channels = read_exr((self.folder / name).read_bytes())
         return [channels[c] for c in "RGB"]
@@ -427,6 +433,16 @@ class Files(LiveTest):
             self.assertAlmostEqual(a, (b + c) / 2, delta=1e-3 * max(1, a))
         self.render("film3.exr", "--seed", "3", "--spp", "16", "--estimator", "none")
         followed.until(lambda state: len(state["pictures"]) == 4)
+
+    def test_frames_of_a_sequence(self):
+        """Films of several views have no mean; the newest comes first."""
+        for frame in ("1", "2"):
+            self.render_frame(frame)
+        followed = self.follow(".")
+        state = followed.until(lambda state: len(state["pictures"]) == 2)
+        self.assertEqual([p["name"] for p in state["pictures"]], ["f_2", "f_1"])
+        self.assertEqual(self.follow("later/").state()["phase"],
+                         "waiting for 'later/', a folder that does not exist yet")
 
     def test_names_are_text(self):
         name = "<img src=x onerror=alert(1)>.exr"

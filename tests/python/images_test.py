@@ -124,6 +124,17 @@ class Metrics(PackageTest):
                          (HEIGHT * WIDTH - 1, 1, (HEIGHT, WIDTH)))
         self.assertAlmostEqual(float(numpy.nanmean(result.map)), result.value, places=6)
 
+    def test_noise_of_references(self):
+        """Known of two for relmse and mse alone; told if it hides the error, or if both are the same."""
+        image, first, second = (noisy(seed, False)[0] for seed in (3, 4, 5))
+        with self.assertWarnsRegex(covary.CovaryWarning, "the noise of the references makes the relmse of "):
+            noise = covary.metrics.compute("relmse", first + 1e-4 * image, first, second).reference_error
+        self.assertGreater(noise, 0)
+        self.assertIsNone(covary.metrics.compute("relmse", image, first).reference_error)
+        self.assertIsNone(covary.metrics.compute("flip", image, first, second).reference_error)
+        with self.assertWarnsRegex(covary.CovaryWarning, "these are the same image"):
+            covary.metrics.mse(image, first, first.copy())
+
     def test_errors(self):
         image = noisy(3, False)[0]
         self.assertIn("relmse", self.message_of(covary.UsageError, covary.metrics.compute, "relmsee", image, image))
@@ -156,6 +167,24 @@ class Images(PackageTest):
         self.assertAlmostEqual(float(attributes["covary:predicted_relmse"]) / result.predicted_relmse, 1, 3)
         for text, bound in zip(attributes["covary:predicted_relmse_80"].split(), result.predicted_bounds, strict=True):
             self.assertAlmostEqual(float(text) / bound, 1, 3)
+
+    def test_saved_results_replace_no_other_files(self):
+        """As commands of the program do: only what they made, unless told to."""
+        result, render = covary.combine(*pair()), self.path / "render.exr"
+        covary.render("room", 4, "none", resolution=(24, 16), output=render)
+        for name in ("a.exr", "a.png", "a.tif"):
+            for _ in range(2):
+                result.save(self.path / name)
+        other = self.path / "other.png"
+        other.write_bytes(b"something else")
+        for path in (render, other):
+            before = path.read_bytes()
+            self.assertEqual(self.message_of(covary.UsageError, result.save, path),
+                             f"path: '{path}' already exists, and save() did not make it; give another name, or "
+                             "overwrite=True to replace it")
+            self.assertEqual(path.read_bytes(), before)
+            result.save(path, overwrite=True)
+            result.save(path)
 
     def test_errors(self):
         missing = str(self.path / "missing.exr")

@@ -104,6 +104,10 @@ class Experiments(PackageTest):
         self.assertEqual(said.getvalue(), "")
         self.assertEqual({total for _, total in told} - {0}, {4}, told)  # two references and two seeds
         self.assertEqual(sorted(told), told)
+        self.assertEqual(told[-1], (4, 4))
+        with contextlib.redirect_stderr(said):
+            covary.experiment(SUITE, self.path / "log", scenes=ROOM.parent, progress=True)
+        self.assertRegex(said.getvalue(), r"^(runs: \d of 4\n)*runs: 4 of 4\n$")
 
     def test_line_on_a_terminal(self):
         """From the beginning, and not asked for."""

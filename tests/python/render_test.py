@@ -123,6 +123,14 @@ class Render(PackageTest):
                 with ThreadPoolExecutor(4) as threads:
                     self.assertEqual(list(threads.map(bits, range(4))), alone, integrator)
 
+    def test_frames_that_were_interrupted_are_not_complete(self):
+        """They do not count for progress."""
+        image, file = numpy.zeros((4, 4, 3), numpy.float32), str(self.path / "f.exr")
+        self.assertFalse(covary._covary.is_complete_file(file))
+        for complete in ("false", "true"):
+            covary.write_image(file, image, {"covary:complete": complete})
+            self.assertEqual(covary._covary.is_complete_file(file), complete == "true")
+
     def test_threads_load_render_denoise_and_save(self):
         """What is made when each thread begins from the file: meshes, the ray tracer's tree, films, images on disk."""
         def bits(seed):

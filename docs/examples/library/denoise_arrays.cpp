@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// Denoises two renders in memory, arrays of floats with albedo and normals, and tells the error that is left.
+//
+//     denoise_arrays RENDER.exr OTHER_SEED.exr OUT.exr
+//
+// The two files, which have layers Albedo and N, stand for a renderer of your own.
+#include <covary/combine/combine.h>
+#include <covary/combine/registry.h>
+#include <covary/combine/result_file.h>
+#include <covary/denoising/denoising_choice.h>
+#include <covary/film/image_file.h>
+
+#include <cstdio>
+#include <exception>
+#include <vector>
+
+using covary::Image;  // width, height, channels, and the floats in `data`: [y][x][channel]
+
+Image mean_of(Image a, const Image& b) {
+  for (size_t i = 0; i < a.data.size(); ++i) a.data[i] = (a.data[i] + b.data.at(i)) / 2;
+  return a;
+}
+
+int main(int argc, char** argv) try {
+  if (argc != 4) return std::fprintf(stderr, "denoise_arrays RENDER.exr OTHER_SEED.exr OUT.exr\n"), 2;
+  const auto layer = [&](int file, const char* name) { return covary::read_image(argv[file], name).image; };
+  const Image renders[] = {layer(1, ""), layer(2, "")};  // linear RGB
+  const Image albedo = mean_of(layer(1, "Albedo"), layer(2, "Albedo"));
+  const Image normal = mean_of(layer(1, "N"), layer(2, "N"));
+
+  // [y][x][render][rgb]: of each pixel the means of all renders, of equal numbers of samples.
+  const int width = renders[0].width, height = renders[0].height;
+  std::vector<float> samples;
+  for (size_t i = 0; i < renders[0].data.size(); i += 3)
+    for (const Image& render : renders)
+      for (size_t c = i; c < i + 3; ++c) samples.push_back(render.data.at(c));
+
+  covary::CombineRequest request;  // refers to these arrays
+  request.independent = covary::source_of({width, height, 2, samples.data()}, {.name = "my renders"});
+  request.estimator = covary::make_default_estimator(false, {}, {covary::DenoisingChoice::kAuto});
+  request.settings.std_error = true;
+  request.settings.features.albedo = &albedo;  // of the image's size; finite, with 0 where nothing was hit
+  request.settings.features.normal = &normal;  // in [-1, 1]
+  request.checked = [](const covary::InputFindings& found) {
+    for (const covary::Finding& finding : found.findings)
+      if (finding.severity == covary::Finding::Severity::kWarning)
+        std::fprintf(stderr, "warning: %s\n", finding.text.c_str());
+  };
+  covary::CombinedImage combined = covary::combine(request);
+
+  if (!combined.image.note.empty()) std::printf("%s\n", combined.image.note.c_str());
+  if (const auto& error = combined.predicted)  // `doubt`: why it may be wrong
+    std::printf("predicted relMSE %.3g%s%s\n", error->relmse, error->doubt.empty() ? "" : ", but ",
+                error->doubt.c_str());
+  covary::write_result(argv[3], request.independent.origin.place, {}, combined.image, combined.layers);
+  return 0;  // the picture is combined.image.estimate, its standard error combined.image.std_error
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "denoise_arrays: %s\n", error.what());
+  return 1;
+}
