@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -49,17 +50,17 @@ const std::map<std::string, std::string>& measured_hashes() {
   return hashes;
 }
 
-/// By file. Throws Error(kUsage) for a name that no built-in suite has.
+/// Whether the file is what a person calls `name`: kitchen/scene_v3.xml is "kitchen", room.xml "room".
+bool is_called(const std::string& file, const std::string& name) {
+  return file == name || file.starts_with(name + "/") || file.substr(0, file.rfind('.')) == name;
+}
+
+/// By file. Throws Error(kUsage) for a name that neither a built-in suite nor a scene of one has.
 std::map<std::string, KnownScene> known_scenes(const std::vector<std::string>& only) {
-  std::vector<std::string> names;
-  for (const auto& [name, text] : lab::builtin_suites()) names.push_back(name);
-  for (const std::string& name : only)
-    if (!lab::builtin_suites().contains(name))
-      throw Error(ErrorCode::kUsage,
-                  fmt::format("no suite is named '{}'", name) +
-                      hint_and_list(name, names, fmt::format("expected {}", fmt::join(names, ", "))));
   std::map<std::string, KnownScene> scenes;
-  for (const std::string& name : only.empty() ? names : only) {
+  std::vector<std::string> suites, names;
+  for (const auto& [name, text] : lab::builtin_suites()) {
+    suites.push_back(name);
     const lab::Suite suite = lab::parse_suite(std::string(lab::builtin_suites().at(name)), name);
     for (const lab::SceneEntry& entry : suite.scenes) {
       KnownScene& scene = scenes[entry.file];
@@ -67,6 +68,20 @@ std::map<std::string, KnownScene> known_scenes(const std::vector<std::string>& o
       scene.suites.insert(name);
     }
   }
+  names = suites;
+  for (const auto& [file, scene] : scenes) names.push_back(file.substr(0, file.find_first_of("./")));
+  const auto is_asked = [](const std::string& name, const auto& scene) {
+    return scene.second.suites.contains(name) || is_called(scene.first, name);
+  };
+  for (const std::string& name : only)
+    if (std::ranges::none_of(scenes, [&](const auto& scene) { return is_asked(name, scene); }))
+      throw Error(ErrorCode::kUsage,
+                  fmt::format("no suite or scene is named '{}'", name) +
+                      hint_and_list(name, names, fmt::format("expected a scene, or {}", fmt::join(suites, ", "))));
+  if (!only.empty())
+    std::erase_if(scenes, [&](const auto& scene) {
+      return std::ranges::none_of(only, [&](const std::string& name) { return is_asked(name, scene); });
+    });
   return scenes;
 }
 
@@ -88,10 +103,20 @@ void list(const std::map<std::string, KnownScene>& scenes) {
   for (const auto& [file, scene] : scenes)
     fmt::print("{}\n    {}\n    in {}{}\n", file, scene.credit, fmt::join(scene.suites, ", "),
                scene.is_own ? "; comes with covary" : "");
+  const auto any = [&](const auto& is) { return std::ranges::any_of(scenes, is); };
+  if (any([](const auto& s) { return s.second.credit.find("Rendering resources") != std::string::npos; }))
+    fmt::print(
+        "Rendering resources: https://benedikt-bitterli.me/resources/; `covary convert-scene scene.xml "
+        "scene_v3.xml` updates those that are older\n");
+  if (any([](const auto& s) { return s.first.starts_with("cms-"); }))
+    fmt::print(
+        "Controlled mixture sampling: https://github.com/qingqhua/ControlledMixtureSampling, in the format of "
+        "SeeSharp\n");
 }
 
 /// Throws Error(kInput) if scenes are missing or cannot be read.
 void check(const std::map<std::string, KnownScene>& scenes, const std::string& folder) {
+  if (!fs::is_directory(folder)) throw Error(ErrorCode::kIo, "--folder '" + folder + "': there is no such folder");
   size_t bad = 0, all = 0;
   for (const auto& [file, scene] : scenes) {
     if (scene.is_own) continue;
@@ -117,7 +142,7 @@ void add_scenes(CLI::App& app) {
   const auto o = std::make_shared<ScenesOptions>();
   CLI::App* command =
       app.add_subcommand("scenes", "List the scenes of the built-in suites, and check a folder of them");
-  add_value(*command, "SUITE", o->suites, "SUITE", "Only those of these suites; default: of all");
+  add_value(*command, "SUITE", o->suites, "NAME", "Only those of these suites, or these scenes; default: all");
   add_value(*command, "--folder", o->folder, kFolderValue,
             "Say which of them this folder has, and whether they are those that the tables were measured with");
   command->callback([o] { run(*o); });

@@ -273,14 +273,13 @@ std::string flip_verdict(const Results& results, size_t budget) {
   if (!best || best == baseline || !std::isfinite(best->flip)) return "";
   const std::string& name = suite.methods[best->method].name;
   const double gain = baseline ? baseline->flip - best->flip : kNone;
+  const std::string start = fmt::format("To the eye, as FLIP measures it with {}, ", suite.budgets[budget].label());
   if (baseline &&
       !(gain > kSeen * baseline->flip && !(gain < kClearly * flip_noise(results, budget, *best, *baseline))))
-    return fmt::format(
-        "To the eye, as FLIP measures it, no method is clearly nearer to the reference than '{}' ({:.2g}; "
-        "'{}' {:.2g}).",
-        suite.baseline, baseline->flip, name, best->flip);
-  return fmt::format("To the eye, as FLIP measures it, '{}' is nearest to the reference: {:.2g}, '{}' {:.2g}.", name,
-                     best->flip, suite.baseline, baseline ? baseline->flip : kNone);
+    return start + fmt::format("no method is clearly nearer to the reference than '{}' ({:.2g}; '{}' {:.2g}).",
+                               suite.baseline, baseline->flip, name, best->flip);
+  return start + fmt::format("'{}' is nearest to the reference: {:.2g}, '{}' {:.2g}.", name, best->flip, suite.baseline,
+                             baseline ? baseline->flip : kNone);
 }
 
 }  // namespace
@@ -290,7 +289,8 @@ std::vector<std::string> verdicts(const Results& results, size_t budget) {
   std::vector<std::string> all;
   if (of.spp > 0)
     all.push_back(verdict(results, budget, fmt::format("At equal samples ({})", of.label()), &Summary::equal_sample));
-  all.push_back(verdict(results, budget, of.spp > 0 ? "At equal time" : fmt::format("At equal time ({})", of.label()),
+  all.push_back(verdict(results, budget,
+                        fmt::format("At equal time ({}{})", of.spp > 0 ? "measured with " : "", of.label()),
                         &Summary::equal_time));
   all.push_back(flip_verdict(results, budget));
   std::erase(all, "");

@@ -265,7 +265,8 @@ TEST(ReportDocument, SaysWhichMethodHasTheLeastError) {
       (std::vector<std::string>{
           "At equal samples (24 spp) 'iicv' has the lowest error: 4 times lower than 'pt' (3.5 to 4.5). Not clearly "
           "worse: 'crn'.",
-          "At equal time no method has less error than 'pt'; next is 'crn', with 1.2 times as much."}))
+          "At equal time (measured with 24 spp) no method has less error than 'pt'; next is 'crn', with 1.2 times as "
+          "much."}))
       << "a method that lacks a scene does not count";
   EXPECT_EQ(verdicts(results, 1),
             std::vector<std::string>{"At equal time (10 s) 'iicv' has the lowest error: 2 times lower than 'pt' (no "
@@ -304,11 +305,11 @@ TEST(ReportDocument, JudgesFlipByWhatCanBeSeenAndTold) {
     return all.empty() ? "" : all.back();
   };
   const std::string unclear =
-      "To the eye, as FLIP measures it, no method is clearly nearer to the reference than 'pt' ";
+      "To the eye, as FLIP measures it with 24 spp, no method is clearly nearer to the reference than 'pt' ";
   EXPECT_EQ(verdict_of(0.0717, 0.0716, 1e-5), unclear + "(0.072; 'iicv' 0.072).") << "nobody sees that";
   EXPECT_EQ(verdict_of(0.08, 0.07, 0.02), unclear + "(0.08; 'iicv' 0.07).") << "noise";
   EXPECT_EQ(verdict_of(0.08, 0.07, 0.001),
-            "To the eye, as FLIP measures it, 'iicv' is nearest to the reference: 0.07, 'pt' 0.08.");
+            "To the eye, as FLIP measures it with 24 spp, 'iicv' is nearest to the reference: 0.07, 'pt' 0.08.");
 }
 
 TEST(ReportDocument, ShowsTheBudgetOfTheSuite) {

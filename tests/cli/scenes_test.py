@@ -21,6 +21,15 @@ class Scenes(CliTest):
         one = self.good("scenes", "cms-table1").stdout
         self.assertIn("cms-rgbsofa/scene.xml", one)
         self.assertNotIn("kitchen", one)
+        self.assertIn("https://github.com/qingqhua/ControlledMixtureSampling", one)
+        kitchen = self.good("scenes", "kitchen").stdout
+        self.assertRegex(kitchen, r"^kitchen/scene_v3\.xml\n.*Jay-Artist.*\n    in .*iicv-table1")
+        self.assertEqual(len(kitchen.splitlines()), 4)
+        self.assertIn("https://benedikt-bitterli.me/resources/", kitchen)
+        self.assertIn("room.xml\n", self.good("scenes", "room").stdout)
+
+    def test_a_folder_that_is_missing(self):
+        self.bad(1, "--folder 'nowhere': there is no such folder", "scenes", "iicv-table1", "--folder", "nowhere")
 
     def test_checks_a_folder(self):
         """All that is missing at once; another scene under the name is told."""
@@ -35,7 +44,7 @@ class Scenes(CliTest):
         self.assertEqual(lines["kitchen/scene_v3.xml"], "another version")
         self.assertEqual(lines["staircase/scene_v3.xml"], "missing")
         self.assertIn("house/scene_v3.xml", lines["house/scene_v3.xml"])
-        self.bad(2, "no suite is named 'iicv-table2'; did you mean 'iicv-table1'", "scenes", "iicv-table2")
+        self.bad(2, "no suite or scene is named 'iicv-table2'; did you mean 'iicv-table1'", "scenes", "iicv-table2")
 
 
 if __name__ == "__main__":
