@@ -138,6 +138,7 @@ bool PlanRun::render_to_limits() {
       callbacks_.predicted(request_.until_in_blocks
                                ? PredictedError{error_to_limit(), std::nullopt, result_.predicted->doubt}
                                : *result_.predicted);
+    if (in_rounds() && has_time_for_another_image() && next_round_fits()) continue;
     if (in_rounds()) return true;
     const bool out_of_time = timed() && seconds_left(plan_.phases.size() - 1, 1) <= 0;
     if (!out_of_time && wants_more()) continue;

@@ -43,6 +43,7 @@ class PlanRun {
   double end_of_band(int n_rows, std::span<const PassPlan> plans);
   /// Whether the time suffices for more samples, for which it sets the budget.
   bool next_round_fits();
+  bool has_time_for_another_image();
   /// How often samples are traced: again for images of their parts.
   double times_traced() const { return 1.0 + request_.splits_layers() + request_.path_lengths; }
   void keep_choice();

@@ -507,7 +507,7 @@ class Time(RenderTest):
 
     def test_rendering_leaves_time_for_the_estimate(self):
         # Slow ones, so that the time left for the estimate is more than the noise of a busy machine; a render that
-        # leaves none         # ends after the limit in every attempt.
+        # leaves none ends after the limit in every attempt.
         slow = ("--set", "k=100", "--set", "window=21")
         for estimator, *arguments in (("iicv", *slow), ("cv-baseline", *slow), ("iduw", "--set", "window=21")):
             with self.subTest(estimator):
