@@ -7,6 +7,7 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "core/error.h"
@@ -250,11 +251,26 @@ Features network_features(const Features& features) {
   return {features.denoising_albedo, features.denoising_normal, nullptr, nullptr, nullptr, features.clean};
 }
 
+NetworkCalls network_calls(const Features& features, const DenoiseOptions& options) {
+  const auto kept = std::make_shared<std::optional<NetworkWithFeatures>>();
+  const auto network = [kept, features = network_features(features), options]() -> NetworkWithFeatures& {
+    return *kept ? **kept : kept->emplace(features, options);
+  };
+  return {.images =
+              [network](std::array<Image, 3> images) {
+                const bool has_halves = !images[1].data.empty();
+                denoise_all(network(), std::span(images).first(has_halves ? 3 : 1));
+                return NetworkImages{std::move(images), network().runs()};
+              },
+          .layers =
+              [network](std::vector<Image> layers) {
+                for (Image& layer : layers) layer = network().denoise(std::move(layer));
+                return NetworkLayers{std::move(layers), network().runs()};
+              }};
+}
+
 NetworkImages network_images(const Features& features, const DenoiseOptions& options, std::array<Image, 3> images) {
-  NetworkWithFeatures network(network_features(features), options);
-  const bool has_halves = !images[1].data.empty();
-  denoise_all(network, std::span(images).first(has_halves ? 3 : 1));
-  return {std::move(images), network.runs()};
+  return network_calls(features, options).images(std::move(images));
 }
 
 CandidateMaker neural_candidates(const Features& features, const DenoiseOptions& options, CandidateBase base,

@@ -105,6 +105,18 @@ struct NetworkImages {
   std::array<Image, 3> images;
   int runs = 0;  ///< of the network
 };
+/// Layers that a neural network denoised.
+struct NetworkLayers {
+  std::vector<Image> images;
+  int runs = 0;  ///< of the network so far
+};
+/// A neural network with its features, for images that are made elsewhere. The features must outlive it. Throws like
+/// denoise(). `images`: as network_images(); `layers`: denoises each on its own.
+struct NetworkCalls {
+  std::function<NetworkImages(std::array<Image, 3>)> images;
+  std::function<NetworkLayers(std::vector<Image>)> layers;
+};
+NetworkCalls network_calls(const Features& features, const DenoiseOptions& options);
 /// `images`: what is denoised, of all samples and of both halves, or all samples alone with empty images of the halves.
 /// Throws like denoise().
 NetworkImages network_images(const Features& features, const DenoiseOptions& options, std::array<Image, 3> images);

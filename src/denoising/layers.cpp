@@ -58,6 +58,13 @@ void add_up(const Image& image, std::span<Image* const> layers) {
   });
 }
 
+void add_up(const Image& image, std::span<const Layer> layers, std::span<Image> images) {
+  std::map<int, std::vector<Image*>> sums;
+  for (size_t k = 0; k < images.size(); ++k)
+    if (layers[k].sum != Layer::kNoSum) sums[layers[k].sum].push_back(&images[k]);
+  for (const auto& [number, parts] : sums) add_up(image, parts);
+}
+
 std::vector<Image> denoise_layers(const LayersInput& in) {
   const std::vector<unsigned char>& valid = *in.candidates.valid;
   const LimitedGroups limited(*in.independent, valid);
@@ -80,10 +87,7 @@ std::vector<Image> denoise_layers(const LayersInput& in) {
           for (size_t i = 0; i < result[k].data.size(); ++i)
             if (valid[i / 3]) result[k].data[i] += weights[i / 3] * (candidate[k].data[i] - means[k].data[i]);
       }
-  std::map<int, std::vector<Image*>> sums;
-  for (size_t k = 0; k < result.size(); ++k)
-    if (in.layers[k].sum != Layer::kNoSum) sums[in.layers[k].sum].push_back(&result[k]);
-  for (const auto& [number, layers] : sums) add_up(*in.image, layers);
+  add_up(*in.image, in.layers, result);
   return result;
 }
 

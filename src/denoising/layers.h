@@ -38,5 +38,7 @@ std::vector<Image> denoise_layers(const LayersInput& input);
 
 /// Makes layers add up to `image`, as above. They have its size.
 void add_up(const Image& image, std::span<Image* const> layers);
+/// The same for all that have a sum: images[k] is that of layers[k].
+void add_up(const Image& image, std::span<const Layer> layers, std::span<Image> images);
 
 }  // namespace covary

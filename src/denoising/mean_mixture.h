@@ -5,9 +5,12 @@
 
 #include <array>
 #include <functional>
+#include <span>
+#include <vector>
 
 #include "denoising/candidates.h"
 #include "denoising/parts_mixture.h"
+#include "estimators/method.h"
 #include "film/grouped_image.h"
 
 namespace covary {
@@ -19,8 +22,11 @@ struct MeanMixture {
   PartsWeighting weighting;
   /// A network's images, whose candidates come first: of all samples and of both halves; empty: without one.
   std::function<NetworkImages(std::array<Image, 3> noisy)> network;
-  bool std_error = false;  ///< estimate the result's error
-  bool stages = false;     ///< candidates and weights are wanted, too
+  bool std_error = false;              ///< estimate the result's error
+  bool stages = false;                 ///< candidates and weights are wanted, too
+  std::span<const Layer> layers = {};  ///< to be denoised with the mixture's weights (layers.h)
+  /// What the network makes of layers; empty: without one.
+  std::function<NetworkLayers(std::vector<Image> noisy)> network_of_layers = {};
 };
 
 /// The image of an estimator of two passes; without residual correction.

@@ -215,20 +215,18 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
       return denoise_frame(parts_of_mean(independent), makers, options, settings, settings.layers);
     };
     if (!options.mix_mean) return here();
-    if (options.history.is_used() || !settings.layers.empty() || !can_be_mixed(independent)) {
+    if (options.history.is_used() || !can_be_mixed(independent)) {
       MixedDenoising out = here();
-      const char* const what = options.history.is_used() ? "frames with a history"
-                               : settings.layers.empty() ? "images of very few samples"
-                                                         : "images with layers";
-      tell_that_made_here(options, what, out.result);
+      tell_that_made_here(options, options.history.is_used() ? "frames with a history" : "images of very few samples",
+                          out.result);
       return out;
     }
-    MeanMixture request{independent, settings.features,  kinds, settings_of(options.mode).weighting,
-                        {},          settings.std_error, stages};
-    if (with_oidn)
-      request.network = [&](std::array<Image, 3> noisy) {
-        return network_images(settings.features, options.oidn, std::move(noisy));
-      };
+    MeanMixture request{independent, settings.features,  kinds,  settings_of(options.mode).weighting,
+                        {},          settings.std_error, stages, settings.layers};
+    if (with_oidn) {
+      const NetworkCalls network = network_calls(settings.features, options.oidn);
+      request.network = network.images, request.network_of_layers = network.layers;
+    }
     return options.mix_mean(request, here);
   };
 }

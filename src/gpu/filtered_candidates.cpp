@@ -46,7 +46,7 @@ SurfaceBuffers FeatureBuffers::surfaces() const {
 }
 
 void filter(Device& device, const Groups& groups, const FeatureBuffers& features, CandidateBase base,
-            const PartBuffers& part, bool is_half, const Place& results) {
+            const PartBuffers& part, bool is_half, const Place& results, const Buffer<float>* layer) {
   const size_t values = 3 * static_cast<size_t>(groups.pixels());
   size_t next = results.first + (features.features() ? values : 0);  // the regression is the first
   NlMeansInput input{groups.width, groups.height, &part.noisy(), &part.noisy_error(), &groups.valid};
@@ -56,11 +56,11 @@ void filter(Device& device, const Groups& groups, const FeatureBuffers& features
     input.bandwidths = {kSharpBandwidth, kSmoothBandwidth};
     const bool is_pair = base == CandidateBase::kPair;
     const size_t smooth = next + (is_pair ? 2 : 1) * values;
+    input.source = layer;
     gpu::nl_means(device, input, {{Place{results.buffer, next}, Place{results.buffer, smooth}}});
     if (is_pair) {
       input.source = &part.independent.mean, input.bandwidths = {kSharpBandwidth};
       gpu::nl_means(device, input, {{Place{results.buffer, next + values}}});
-      input.source = nullptr;
     }
     next = smooth + values;
   }
@@ -68,7 +68,8 @@ void filter(Device& device, const Groups& groups, const FeatureBuffers& features
   const Buffer<float> image = demodulated(device, part.noisy(), *features.albedo());
   const Buffer<float> error = demodulated(device, part.noisy_error(), *features.albedo());
   const auto clean = device.make<float>(values);
-  input.image = &image, input.std_error = &error;
+  const Buffer<float> source = layer ? demodulated(device, *layer, *features.albedo()) : Buffer<float>();
+  input.image = &image, input.std_error = &error, input.source = or_null(source);
   input.features.clear();
   if (features.normal()) input.features.push_back({features.normal(), kNormalUnit});
   input.bandwidths = {kSharpBandwidth};
@@ -84,7 +85,8 @@ void filter(Device& device, const Groups& groups, const FeatureBuffers& features
              .valid = &groups.valid,
              .features = features.features(),
              .other = {results.buffer, next},
-             .coarse = is_half},
+             .coarse = is_half,
+             .source = layer},
             *results.buffer);
 }
 

@@ -31,7 +31,8 @@ class FeatureBuffers {
 };
 
 /// Writes the candidates of filter_names() to `results`, one after another. `is_half`: with coarse regression.
+/// `layer`: of a mean, filter this image, with the weights of the part's; null: the part's itself.
 void filter(Device& device, const Groups& groups, const FeatureBuffers& features, CandidateBase base,
-            const PartBuffers& part, bool is_half, const Place& results);
+            const PartBuffers& part, bool is_half, const Place& results, const Buffer<float>* layer = nullptr);
 
 }  // namespace covary::gpu

@@ -95,12 +95,23 @@ TEST(GpuNlMeans, AveragesAnotherImage) {
   const Scene s;
   device::Device& device = test_device();
   const Planes planes = feature_planes({{&s.albedo, 0.07f}});
-  const NlMeansSteering steering{&s.image, &s.std_error, {{0.5f, {&s.albedo}}}};
-  const auto result = device.make<float>(s.image.data.size());
+  const NlMeansSteering steering{&s.image, &s.std_error, {{0.5f, {&s.albedo}}, {1, {&s.albedo}}}};
+  const std::vector<Image> expected = covary::nl_means({&steering, 1}, &planes, s.valid);
+  const size_t values = s.image.data.size();
+  const auto result = device.make<float>(2 * values);
   NlMeansInput input{kWidth, kHeight, &s.d_image, &s.d_error, &s.d_valid, {{&s.d_albedo, 0.07f}}, {0.5f}};
   input.source = &s.d_albedo;
+  std::vector<float> found(values);
+  const auto expect = [&](const Image& image, size_t first) {
+    device.read(result, found, first);
+    EXPECT_TRUE(agree(image.data, found)) << first;
+  };
   nl_means(device, input, {{Place{&result}}});
-  EXPECT_TRUE(agree(covary::nl_means({&steering, 1}, &planes, s.valid)[0].data, device.download(result)));
+  expect(expected[0], 0);
+  input.bandwidths = {0.5f, 1};
+  nl_means(device, input, {{Place{&result}, Place{&result, values}}});
+  expect(expected[0], 0);
+  expect(expected[1], values);
 }
 
 TEST(GpuNlMeans, IsTheSameEveryTime) {
@@ -117,6 +128,7 @@ TEST(GpuNlMeans, NoticesTooSmallPatches) {
 struct RegressionCase {
   bool coarse = false, with_position = true, planted_bug = false;
   size_t weights_at_once = size_t{1} << 25;
+  bool fits_normal = false;  ///< with the weights of the image
 };
 
 std::vector<float> fitted(const Scene& s, const RegressionCase& choice) {
@@ -134,13 +146,15 @@ std::vector<float> fitted(const Scene& s, const RegressionCase& choice) {
              {&s.d_other},
              choice.coarse,
              choice.planted_bug,
-             choice.weights_at_once},
+             choice.weights_at_once,
+             choice.fits_normal ? &s.d_normal : nullptr},
             result);
   return device.download(result);
 }
 
 std::vector<float> fitted_by_processor(const Scene& s, const RegressionCase& choice) {
-  RegressionInput input{&s.image, &s.std_error, {&s.image}, {&s.other}, nullptr, choice.coarse};
+  RegressionInput input{&s.image,   &s.std_error, {choice.fits_normal ? &s.normal : &s.image},
+                        {&s.other}, nullptr,      choice.coarse};
   if (choice.with_position) input.position = &s.other;
   const std::vector<const Image*> features = {&s.albedo, &s.normal};
   return covary::regressed(input, features, s.valid)[0].data;
@@ -160,6 +174,13 @@ TEST(GpuRegression, WorksInBands) {
   const Scene s;
   const RegressionCase in_bands{false, true, false, size_t{441} * 24 * 5};  // five rows of windows at once
   EXPECT_TRUE(agree(fitted_by_processor(s, {}), fitted(s, in_bands)));
+}
+
+TEST(GpuRegression, FitsAnotherImage) {
+  const Scene s;
+  RegressionCase choice;
+  choice.fits_normal = true;
+  EXPECT_TRUE(agree(fitted_by_processor(s, choice), fitted(s, choice)));
 }
 
 TEST(GpuRegression, IsTheSameEveryTime) {

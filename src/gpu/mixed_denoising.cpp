@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "denoising/denoising_parts.h"
+#include "denoising/layers.h"
 #include "denoising/mixed_rows.h"
 #include "denoising/row_bands.h"
 #include "estimators/result_rows.h"
@@ -53,11 +54,15 @@ class MeanDenoising {
       makers = rows.makers();
       append(rows.mix(everywhere), band.skipped, band.y, band.n, height_, whole);
       whole.result.nonfinite_pixels += rows.unusable(band.skipped, band.n);
+      append_layers(rows, band, whole.result.layers);
       if (request_.stages) append_stages(rows, band, out);
     }
     out.names = names_of(makers);
+    std::vector<Image> layers = std::move(whole.result.layers);
     out.result = finish(std::move(whole), makers, "mean");
-    out.result.network_runs = network_.runs;
+    add_up(out.result.estimate, request_.layers, layers);
+    out.result.layers = std::move(layers);
+    out.result.network_runs = std::max(network_.runs, network_layers_.runs);
     return out;
   }
 
@@ -95,11 +100,33 @@ class MeanDenoising {
 
   void run_network() {
     std::array<Image, 3> noisy;
+    std::vector<Image> layers(request_.layers.size());
     for (const RowBand& band : bands(kMeanHalo, 0, height_)) {
       const std::array<Image, 3> part = on_device(band).noisy();
       for (size_t i = 0; i < part.size(); ++i) copy_rows(part[i], band.skipped, band.y, band.n, height_, noisy[i]);
+      for (size_t k = 0; k < layers.size(); ++k)
+        copy_rows(on_device(band).noisy_layer(layer_of(band, k)), band.skipped, band.y, band.n, height_, layers[k]);
     }
-    Stages(device_, trial_).run("network", [&] { network_ = request_.network(std::move(noisy)); });
+    Stages(device_, trial_).run("network", [&] {
+      network_ = request_.network(std::move(noisy));
+      if (!layers.empty()) network_layers_ = request_.network_of_layers(std::move(layers));
+    });
+  }
+
+  /// The rows of layer k in a band.
+  Layer layer_of(const RowBand& band, size_t k) const {
+    const Layer& whole = request_.layers[k];
+    return {whole.name, band.rows < height_ ? rows_of(whole.image, band.first, band.rows) : whole.image, whole.sum};
+  }
+
+  void append_layers(RowsOnDevice& rows, const RowBand& band, std::vector<Image>& layers) const {
+    layers.resize(request_.layers.size());
+    for (size_t k = 0; k < layers.size(); ++k) {
+      Image clean;
+      if (has_network()) clean = rows_of(network_layers_.images[k], band.first, band.rows);
+      const Image part = rows.denoised_layer(layer_of(band, k), has_network() ? &clean : nullptr);
+      copy_rows(part, band.skipped, band.y, band.n, height_, layers[k]);
+    }
   }
 
   std::vector<float> find_weights() {
@@ -132,6 +159,7 @@ class MeanDenoising {
   int rows_at_once_ = 0;
   std::optional<BandOnDevice> last_;
   NetworkImages network_;
+  NetworkLayers network_layers_;
 };
 
 }  // namespace
@@ -139,7 +167,7 @@ class MeanDenoising {
 MixedDenoising mix_mean(Device& device, const MeanMixture& request, const Trial& trial) {
   const GroupedImage& image = request.independent;
   BandNeeds needs;
-  needs.bytes_per_pixel = bytes_of_mean(image.groups);
+  needs.bytes_per_pixel = bytes_of_mean(image.groups) + (request.layers.empty() ? 0 : bytes_of_layer(image.groups));
   needs.largest_buffer_per_pixel = largest_buffer_of_mean(image.groups);
   const int halo = mixed_halo(CandidateBase::kMean, static_cast<bool>(request.network), kMeanHalo, request.weighting);
   int rows =

@@ -149,10 +149,9 @@ TEST(GpuMixedDenoising, IsPartOfTheDefault) {
   const MethodImage found = method.image({{}, image.view()}, {});
   EXPECT_EQ(target->made_by(), target->info().text());
   EXPECT_EQ(found.note, "");
-  const Layer layer{"Direct", image.view(), 0};
-  MethodSettings settings;
-  settings.layers = std::span(&layer, 1);
-  EXPECT_NE(method.image({{}, image.view()}, settings).note.find("on the processor"), std::string::npos);
+  test::Grouped of_few = image;
+  of_few.counts.assign(size_t{kWidth} * kHeight, 3);
+  EXPECT_NE(method.image({{}, of_few.view()}, {}).note.find("on the processor"), std::string::npos);
 }
 
 TEST(GpuMixedDenoising, TimesItsStages) {

@@ -17,16 +17,16 @@ device::Kernel kernel(Device& device, const char* name, int candidates, bool pla
   return device.kernel("mixture.cl", name, with_bug({fmt::format("M={}", candidates)}, planted_bug));
 }
 
-Buffer<float> mixed(Device& device, const MixtureBuffers& in, const CandidateBuffers& set,
-                    const Buffer<float>& weights) {
+}  // namespace
+
+Buffer<float> mixture_of(Device& device, const MixtureBuffers& in, const CandidateBuffers& set,
+                         const Buffer<float>& weights) {
   auto result = device.make<float>(set.base->size());
   const int pixels = in.width * in.height;
   device.launch(kernel(device, "mix_candidates", in.candidates), list_of(static_cast<size_t>(pixels)), kOfList,
                 *set.base, *set.candidates, weights, *in.valid, pixels, result);
   return result;
 }
-
-}  // namespace
 
 Buffer<float> error_weights(Device& device, const Buffer<float>& guide, const Buffer<float>& std_error) {
   const size_t pixels = std_error.size() / 3;
@@ -69,8 +69,8 @@ MixedBuffers mix(Device& device, const MixtureBuffers& in, const std::vector<flo
   result.weights = device.make<float>(static_cast<size_t>(m) * in.width * in.height);
   device.launch(kernel(device, "mixture_weights", m), image_of(in.width, in.height), kOfImage, cells, guide, of_whole,
                 in.prior, in.width, in.height, result.weights);
-  result.image = mixed(device, in, in.whole, result.weights);
-  for (const int half : {0, 1}) result.halves[half] = mixed(device, in, in.halves[half], result.weights);
+  result.image = mixture_of(device, in, in.whole, result.weights);
+  for (const int half : {0, 1}) result.halves[half] = mixture_of(device, in, in.halves[half], result.weights);
   return result;
 }
 

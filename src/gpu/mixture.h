@@ -44,6 +44,10 @@ struct MixedBuffers {
 /// the guide.
 MixedBuffers mix(Device& device, const MixtureBuffers& in, const std::vector<float>& everywhere);
 
+/// F + sum_p x_p (C_p - F) of a set, with weights as mix() makes them; from `in`: size, number of candidates, pixels.
+Buffer<float> mixture_of(Device& device, const MixtureBuffers& in, const CandidateBuffers& set,
+                         const Buffer<float>& weights);
+
 /// The normal equations of rows first … end - 1, of the halves alone.
 std::vector<NormalRow> normal_rows(Device& device, const MixtureBuffers& in, int first, int end);
 

@@ -53,8 +53,8 @@ void regressed(device::Device& device, const RegressionBuffers& in, const device
   for (int row = 0; row < rows; row += rows_at_once) {
     const int n = std::min(rows_at_once, rows - row);
     device.launch(fit, {static_cast<uint32_t>(columns) * kItems, static_cast<uint32_t>(n)}, {kItems}, *in.image,
-                  *in.std_error, *in.valid, in.features->values, in.width, in.height, step, row, columns, weights,
-                  models);
+                  in.source ? *in.source : *in.image, *in.std_error, *in.valid, in.features->values, in.width,
+                  in.height, step, row, columns, weights, models);
     const int first_y = std::max(0, step * row + 1 - kRadius);
     const int end_y = std::min(in.height, step * (row + n - 1) + 2 + kRadius);
     device.launch(predict, image_of(in.width, end_y - first_y), kOfImage, weights, models, in.features->values,

@@ -29,6 +29,7 @@ struct RegressionBuffers {
   bool planted_bug = false;
   /// Of windows, kept between two kernels: at most 128 MiB, and a sixteenth of the device's memory.
   size_t weights_at_once = size_t{1} << 25;
+  const device::Buffer<float>* source = nullptr;  ///< what is fitted; null: the image itself
 };
 
 /// The filtered image, at the beginning of `result`. The number of weights that are kept at once may change bits, as

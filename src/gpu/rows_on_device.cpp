@@ -10,7 +10,6 @@
 #include "denoising/weighed_candidate.h"
 #include "gpu/held_out.h"
 #include "gpu/network_candidates.h"
-#include "gpu/weighing.h"
 
 namespace covary::gpu {
 
@@ -70,18 +69,24 @@ void RowsOnDevice::make_candidates(const NetworkImages* network) {
     if (weighing) add_weighing_maker(auxiliary_, makers_);
     n_candidates_ = static_cast<int>(names_of(makers_).size());
     const size_t filtered = network && is_mean() ? 3 * pixels() * kNetworkCandidates : 0;
-    const auto weigher = weighing ? std::make_unique<Weighing>(device_, *weighing) : nullptr;
+    if (weighing) weighing_network_ = std::make_unique<Weighing>(device_, *weighing);
     for (size_t i = 0; i < parts_.size(); ++i) {
       candidates_[i] = device_.make<float>(3 * pixels() * n_candidates_);
       filter(device_, groups_, *features_, base_, parts_[i], i > 0, {&candidates_[i], filtered});
       if (network && is_mean()) add_network(network->images[i], i);
       if (network && !is_mean())
         device_.write(candidates_[i], network->images[i].data, 3 * pixels() * (n_candidates_ - 1));
-      if (weigher)
-        weigher->add_weighed({groups_.width, groups_.height, &parts_[i].independent.mean, &candidates_[i],
-                              &parts_[i].noisy_error(), features_->surfaces()});
+      if (!weighing) continue;
+      WeighingCells shares = weighing_network_->add_weighed(weighing_input(i));
+      if (i == 0) shares_ = std::move(shares);
     }
   });
+}
+
+WeighingBuffers RowsOnDevice::weighing_input(size_t part) const {
+  const PartBuffers& p = parts_[part];
+  return {groups_.width,      groups_.height,   &p.independent.mean,
+          &candidates_[part], &p.noisy_error(), features_->surfaces()};
 }
 
 void RowsOnDevice::add_network(const Image& clean, size_t part) {
@@ -157,6 +162,36 @@ void RowsOnDevice::find_errors(MixedRows& rows) {
     held_out.halves = {Place{&candidates_[1], first}, Place{&candidates_[2], first}};
     rows.of_candidates.push_back(held_out_rows(device_, held_out));
   }
+}
+
+LayerBuffers RowsOnDevice::upload_layer(const Layer& layer) {
+  const bool is_part = layer.sum != Layer::kNoSum;
+  if (is_part && !limits_) limits_ = limits_of(device_, groups_, {});
+  return gpu::upload_layer(device_, layer.image, groups_, is_part ? &*limits_ : nullptr);
+}
+
+Image RowsOnDevice::noisy_layer(const Layer& layer) {
+  Image image;
+  stages_.run("copy layers for the network", [&] { image = downloaded(upload_layer(layer).noisy, 3); });
+  return image;
+}
+
+Image RowsOnDevice::denoised_layer(const Layer& layer, const Image* clean) {
+  Image image;
+  stages_.run("layers, with their copies", [&] {
+    const LayerBuffers means = upload_layer(layer);
+    const auto made = device_.make<float>(3 * pixels() * n_made());
+    const int of_network = clean ? kNetworkCandidates : 0;
+    for (int p = 0; p < of_network; ++p) device_.write(made, clean->data, 3 * pixels() * p);
+    filter(device_, groups_, *features_, base_, parts_[0], false, {&made, 3 * pixels() * of_network}, &means.noisy);
+    const bool is_shared = n_made() < n_candidates_;
+    const Buffer<float> shared =
+        is_shared ? weighing_network_->share_weight(shares_, weighing_input(0), mixed_.weights) : Buffer<float>();
+    MixtureBuffers in = mixture_input();
+    in.candidates = n_made();
+    image = downloaded(mixture_of(device_, in, {&means.mean, &made}, is_shared ? shared : mixed_.weights), 3);
+  });
+  return image;
 }
 
 long RowsOnDevice::unusable(int first, int n) {

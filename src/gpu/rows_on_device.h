@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -11,8 +12,10 @@
 #include "denoising/mixed_rows.h"
 #include "gpu/denoising_parts.h"
 #include "gpu/filtered_candidates.h"
+#include "gpu/layers.h"
 #include "gpu/mixture.h"
 #include "gpu/trial.h"
+#include "gpu/weighing.h"
 
 namespace covary::gpu {
 
@@ -35,6 +38,11 @@ class RowsOnDevice {
   std::vector<NormalRow> normal_rows(int first, int end);
   /// The mixture, and what its error needs of these rows. `everywhere`: weights of the whole image.
   MixedRows mix(const std::vector<float>& everywhere);
+  /// A layer of these rows without fireflies: what a network denoises.
+  Image noisy_layer(const Layer& layer);
+  /// A layer of these rows with the weights of the mixture, once it is made. `clean`: what a network made of the noisy
+  /// layer; null: without one.
+  Image denoised_layer(const Layer& layer, const Image* clean);
   /// Pixels that are left out, of rows first … first + n - 1.
   long unusable(int first, int n);
 
@@ -49,6 +57,8 @@ class RowsOnDevice {
   void add_network(const Image& clean, size_t part);
   Buffer<float> counts_of(int half);
   MixtureBuffers mixture_input();
+  LayerBuffers upload_layer(const Layer& layer);
+  WeighingBuffers weighing_input(size_t part) const;
   void find_errors(MixedRows& rows);
   Image downloaded(const Buffer<float>& buffer, int channels, size_t first = 0);
   std::vector<Image> downloaded_images(const Buffer<float>& buffer, int channels);
@@ -69,6 +79,10 @@ class RowsOnDevice {
   std::array<Buffer<float>, 3> candidates_;
   std::array<Buffer<float>, 2> counts_;
   MixedBuffers mixed_;
+  // For layers:
+  std::optional<Limits> limits_;
+  std::unique_ptr<Weighing> weighing_network_;
+  WeighingCells shares_;  ///< of all samples, in the candidate that consists of the others
 };
 
 }  // namespace covary::gpu

@@ -37,7 +37,9 @@ std::shared_ptr<Target> Target::open(const std::string& name) {
 }
 
 void Target::check_finite(const EstimatorResult& result) const {
-  for (const Image* image : {&result.estimate, &result.std_error})
+  std::vector<const Image*> images = {&result.estimate, &result.std_error};
+  for (const Image& layer : result.layers) images.push_back(&layer);
+  for (const Image* image : images)
     if (!std::ranges::all_of(image->data, [](float v) { return std::isfinite(v); }))
       throw device::Failure(device::FailureKind::kLost,
                             fmt::format("{} made values that are not finite numbers", info().text()));

@@ -83,10 +83,19 @@ Weighing::Cells Weighing::shares_of(const WeighingBuffers& in) const {
   return result;
 }
 
-void Weighing::add_weighed(const WeighingBuffers& in) const {
-  const Cells shares = shares_of(in);
+WeighingCells Weighing::add_weighed(const WeighingBuffers& in) const {
+  Cells shares = shares_of(in);
   device_.launch(kernel("weigh", in), image_of(in.width, in.height), kOfImage, *in.mean, shares.values, in.width,
                  in.height, shares.columns, shares.rows, *in.candidates);
+  return shares;
+}
+
+Buffer<float> Weighing::share_weight(const WeighingCells& shares, const WeighingBuffers& in,
+                                     const Buffer<float>& weights) const {
+  auto shared = device_.make<float>(static_cast<size_t>(candidates_) * in.width * in.height);
+  device_.launch(kernel("share_weight", in), image_of(in.width, in.height), kOfImage, shares.values, weights, in.width,
+                 in.height, shares.columns, shares.rows, shared);
+  return shared;
 }
 
 }  // namespace covary::gpu

@@ -18,24 +18,29 @@ struct WeighingBuffers {
   bool planted_bug = false;
 };
 
+/// Planes of cells.
+struct WeighingCells {
+  int columns = 0, rows = 0, count = 0;
+  Buffer<float> values;
+};
+
 /// A network's layers on a device, for so many candidates.
 class Weighing {
  public:
   Weighing(Device& device, const WeighingNetwork& network);
 
-  /// Writes the mixture that the network makes of the candidates behind them.
-  void add_weighed(const WeighingBuffers& in) const;
+  /// Writes the mixture that the network makes of the candidates behind them. Returns the shares in it.
+  WeighingCells add_weighed(const WeighingBuffers& in) const;
+  /// The weights of the candidates in a mixture of them and of that with these shares, whose weights are given.
+  Buffer<float> share_weight(const WeighingCells& shares, const WeighingBuffers& in,
+                             const Buffer<float>& weights) const;
 
  private:
   struct Layer {
     const Convolution& shape;
     Buffer<float> weights, offsets;
   };
-  /// Planes of cells.
-  struct Cells {
-    int columns = 0, rows = 0, count = 0;
-    Buffer<float> values;
-  };
+  using Cells = WeighingCells;
   device::Kernel kernel(const char* name, const WeighingBuffers& in, int side = 1) const;
   Cells make(int columns, int rows, int count) const;
   Cells features_of(const WeighingBuffers& in) const;

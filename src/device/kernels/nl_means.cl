@@ -13,6 +13,7 @@
 // Compiled: GUIDES=1 TASKS=1 SOURCE=0
 // Compiled: GUIDES=2 TASKS=2 SOURCE=0
 // Compiled: GUIDES=2 TASKS=1 SOURCE=1
+// Compiled: GUIDES=2 TASKS=2 SOURCE=1
 #include "portable.h"
 #include "pixels.h"
 

@@ -51,8 +51,9 @@ KERNEL clear(int n, GLOBAL float* values) {
   if (i < n) values[i] = 0;
 }
 
-KERNEL fit_windows(GLOBAL const float* image, GLOBAL const float* std_error, GLOBAL const uchar* valid,
-                        GLOBAL const float* features, int width, int height, int step, int first_row, int columns,
+// source: what is fitted, with the weights of `image`.
+KERNEL fit_windows(GLOBAL const float* image, GLOBAL const float* source, GLOBAL const float* std_error,
+                        GLOBAL const uchar* valid, GLOBAL const float* features, int width, int height, int step, int first_row, int columns,
                         GLOBAL float* weights, GLOBAL float* models) {
   LOCAL_ARRAY(float, colours, BORDERED * BORDERED * 3);
   LOCAL_ARRAY(float, variances, BORDERED * BORDERED * 3);
@@ -113,7 +114,7 @@ KERNEL fit_windows(GLOBAL const float* image, GLOBAL const float* std_error, GLO
       if (term == 2) value = (float)dy / PLACE_UNIT;
       if (term >= 3 && term < TERMS)
         value = features[there * FEATURES + term - 3] - features[centre * FEATURES + term - 3];
-      if (term >= TERMS) value = image[3 * there + term - TERMS];
+      if (term >= TERMS) value = source[3 * there + term - TERMS];
       terms[k] = roots[j] * value;
     }
     group_barrier();

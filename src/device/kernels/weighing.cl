@@ -174,23 +174,38 @@ KERNEL share_out(int n_cells, GLOBAL float* planes) {
   for (int k = 0; k <= M; ++k) planes[(size_t)k * n_cells + i] = powers[k] / sum;
 }
 
-// The mixture of the mean and the candidates, as one more candidate behind them: bilinear interpolation of the shares
-// between the cells of the image; `columns`, `rows`: of their planes.
+// Image k's share at a pixel: bilinear interpolation between the cells of the image; `columns`, `rows`: of their planes.
+FUNCTION float share_at(GLOBAL const float* shares, int k, int x, int y, int columns, int rows) {
+  const int x0 = x / CELL, x1 = clamped(x % CELL == 0 ? x0 - 1 : x0 + 1, columns);
+  const int y0 = y / CELL, y1 = clamped(y % CELL == 0 ? y0 - 1 : y0 + 1, rows);
+  GLOBAL const float* near = shares + ((size_t)k * rows + y0) * columns;
+  GLOBAL const float* far = shares + ((size_t)k * rows + y1) * columns;
+  return 0.75f * (0.75f * near[x0] + 0.25f * near[x1]) + 0.25f * (0.75f * far[x0] + 0.25f * far[x1]);
+}
+
+// The mixture of the mean and the candidates, as one more candidate behind them.
 KERNEL weigh(GLOBAL const float* mean, GLOBAL const float* shares, int width, int height, int columns, int rows,
              GLOBAL float* candidates) {
   const int x = get_global_id(0), y = get_global_id(1);
   if (x >= width || y >= height) return;
-  const int x0 = x / CELL, x1 = clamped(x % CELL == 0 ? x0 - 1 : x0 + 1, columns);
-  const int y0 = y / CELL, y1 = clamped(y % CELL == 0 ? y0 - 1 : y0 + 1, rows);
   const size_t i = 3 * ((size_t)y * width + x), image = 3 * (size_t)width * height;
   float sum[3] = {0, 0, 0};
   for (int k = 0; k <= M; ++k) {
-    GLOBAL const float* near = shares + ((size_t)k * rows + y0) * columns;
-    GLOBAL const float* far = shares + ((size_t)k * rows + y1) * columns;
-    const float share =
-        0.75f * (0.75f * near[x0] + 0.25f * near[x1]) + 0.25f * (0.75f * far[x0] + 0.25f * far[x1]);
+    const float share = share_at(shares, k, x, y, columns, rows);
     GLOBAL const float* rgb = k == 0 ? mean + i : candidates + (k - 1) * image + i;
     for (int c = 0; c < 3; ++c) sum[c] += share * rgb[c];
   }
   for (int c = 0; c < 3; ++c) candidates[M * image + i + c] = sum[c];
+}
+
+// The weights of the M candidates in a mixture whose last candidate is that of weigh(): their own, and their shares in
+// it. weights: of M + 1 candidates, one image after another.
+KERNEL share_weight(GLOBAL const float* shares, GLOBAL const float* weights, int width, int height, int columns,
+                    int rows, GLOBAL float* shared) {
+  const int x = get_global_id(0), y = get_global_id(1);
+  if (x >= width || y >= height) return;
+  const size_t i = (size_t)y * width + x, image = (size_t)width * height;
+  for (int k = 0; k < M; ++k)
+    shared[k * image + i] =
+        weights[k * image + i] + share_at(shares, k + 1 - PLANTED_BUG, x, y, columns, rows) * weights[M * image + i];
 }
