@@ -29,7 +29,7 @@ struct MeanMixture {
   std::function<NetworkLayers(std::vector<Image> noisy)> network_of_layers = {};
 };
 
-/// The image of an estimator of two passes; without residual correction.
+/// The image of an estimator of two passes.
 struct PairMixture {
   const DenoisingParts* parts = nullptr;  ///< with features
   PartsWeighting weighting;

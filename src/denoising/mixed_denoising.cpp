@@ -183,14 +183,12 @@ Run run_of_pair(const Method& base, const MixedDenoisingOptions& options, bool w
       if (with_oidn) makers.push_back(neural_candidates(settings.features, options.oidn));
       return denoise_frame(std::move(parts), makers, options, settings, {});
     };
-    const PartsWeighting weighting = settings_of(options.mode).weighting;
-    if (!options.mix_pair || options.history.is_used() || weighting.residual_correction) {
+    if (!options.mix_pair || options.history.is_used()) {
       MixedDenoising out = here();
-      tell_that_made_here(
-          options, options.history.is_used() ? "frames with a history" : "images of a pair with less bias", out.result);
+      tell_that_made_here(options, "frames with a history", out.result);
       return out;
     }
-    PairMixture request{&parts, weighting, {}, settings.std_error, stages};
+    PairMixture request{&parts, settings_of(options.mode).weighting, {}, settings.std_error, stages};
     if (with_oidn)
       request.network = [&] {
         return network_images(settings.features, options.oidn,

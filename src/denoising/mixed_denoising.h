@@ -49,7 +49,7 @@ struct MixedDenoisingOptions {
   /// Makes the mixture of a mean without history elsewhere, such as on a GPU, or by calling `here`; empty:
   /// here.
   std::function<MixedDenoising(const MeanMixture&, const std::function<MixedDenoising()>& here)> mix_mean;
-  /// Same for a pair, without residual correction.
+  /// Same for a pair.
   std::function<MixedDenoising(const PairMixture&, const std::function<MixedDenoising()>& here)> mix_pair;
 };
 

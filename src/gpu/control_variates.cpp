@@ -11,6 +11,7 @@
 #include "filters/relative_counts.h"
 #include "gpu/bands.h"
 #include "gpu/launch.h"
+#include "gpu/residual_correction.h"
 
 namespace covary::gpu {
 namespace {
@@ -72,7 +73,11 @@ class Variates {
     find_similar();
     find_nearest();
     solve();
-    if (steps_.residual_correction) correct_residual();
+    if (steps_.residual_correction)
+      stages_.run("residual correction", [&] {
+        correct_residual(device_, stages_, {crn_.width, crn_.height, &guide_, &other_, &valid_, &std_error_},
+                         steps_.residual_options, estimate_);
+      });
     EstimatorResult result;
     stages_.run("copy back", [&] { read(result); });
     return result;
@@ -154,36 +159,6 @@ class Variates {
       device_.launch(kernel, {kItems * static_cast<uint32_t>(crn_.width), static_cast<uint32_t>(crn_.height)}, {kItems},
                      records_, guide_, other_, chosen_, offsets_, crn_.width, crn_.height, s_.sample_fraction,
                      s_.mean_constraint, s_.ridge, estimate_, std_error_);
-    });
-  }
-
-  /// Cells of side x side pixels: features and residuals of kernels/residual_correction.cl.
-  std::pair<Buffer<float>, Buffer<float>> cells(int side) {
-    const int columns = (crn_.width + side - 1) / side, rows = (crn_.height + side - 1) / side;
-    const size_t size = 4 * static_cast<size_t>(columns) * rows;
-    std::pair<Buffer<float>, Buffer<float>> made{device_.make<float>(size), device_.make<float>(size)};
-    device_.launch(of_correction("residual_cells", side), image_of(columns, rows), kOfImage, estimate_, valid_, guide_,
-                   other_, crn_.width, crn_.height, made.first, made.second);
-    return made;
-  }
-  device::Kernel of_correction(const char* name, int side) {
-    return stages_.kernel("residual_correction.cl", name, {fmt::format("SIDE={}", side)});
-  }
-
-  void correct_residual() {
-    const ResidualCorrectionOptions& o = steps_.residual_options;
-    const float bandwidth = o.bandwidth * o.bandwidth;
-    stages_.run("residual correction", [&] {
-      {
-        const auto pixels = cells(1), pairs = cells(2);
-        device_.launch(of_correction("correct_mixed", 1), image_of(crn_.width, crn_.height), kOfImage, pixels.first,
-                       pixels.second, pairs.first, pairs.second, valid_, std_error_, crn_.width, crn_.height,
-                       o.window / 4, o.window / 2 / 2, bandwidth, estimate_);
-      }
-      const auto wide = cells(kResidualCell);
-      device_.launch(of_correction("correct_again", kResidualCell), image_of(crn_.width, crn_.height), kOfImage,
-                     wide.first, wide.second, valid_, std_error_, crn_.width, crn_.height, o.window / 2 / kResidualCell,
-                     bandwidth, estimate_);
     });
   }
 

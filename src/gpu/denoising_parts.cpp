@@ -67,6 +67,7 @@ PartBuffers upload(Device& device, const DenoisingPart& part) {
   result.independent = {upload(device, part.independent.mean), upload(device, part.independent.variance_of_mean)};
   result.estimate = device.upload(std::span(part.image.estimate.data));
   result.std_error = device.upload(std::span(part.image.std_error.data));
+  if (part.independent.relative_count) result.relative_count = upload(device, *part.independent.relative_count);
   return result;
 }
 

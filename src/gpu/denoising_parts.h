@@ -58,7 +58,8 @@ struct PartBuffers {
   Buffer<float> std_error;
   /// Without fireflies; empty for a set of one group, which has no other to confirm them.
   Buffer<float> limited, limited_error;
-  Buffer<float> estimate;  ///< the image, if that is not the mean
+  Buffer<float> estimate;        ///< the image, if that is not the mean
+  Buffer<float> relative_count;  ///< of samples, for that image; empty if all pixels have the same number
 
   const Buffer<float>& image() const { return estimate ? estimate : independent.mean; }
   const Buffer<float>& noisy() const { return limited ? limited : image(); }

@@ -43,7 +43,7 @@ std::vector<NormalRow> normal_rows(Device& device, const MixtureBuffers& in, int
   device.launch(kernel(device, "normal_parts", in.candidates, in.planted_bug), image_of(n_parts, n), kOfImage,
                 *in.halves[0].base, *in.halves[1].base, *in.halves[0].candidates, *in.halves[1].candidates,
                 *in.independent[0], *in.independent[1], *in.counts[0], *in.counts[1], *in.valid, in.bias_share,
-                in.width, in.height, first, n, kPartOfRow, parts);
+                int{in.of_pair}, in.width, in.height, first, n, kPartOfRow, parts);
   const std::vector<float> sums = device.download(parts);
   std::vector<NormalRow> rows(static_cast<size_t>(n));
   const float* next = sums.data();
@@ -61,7 +61,7 @@ MixedBuffers mix(Device& device, const MixtureBuffers& in, const std::vector<flo
   device.launch(kernel(device, "normal_cells", m, in.planted_bug), image_of(columns, rows), kOfImage, guide,
                 *in.halves[0].base, *in.halves[1].base, *in.halves[0].candidates, *in.halves[1].candidates,
                 *in.independent[0], *in.independent[1], *in.counts[0], *in.counts[1], *in.valid, in.bias_share,
-                in.width, in.height, cells);
+                int{in.of_pair}, in.width, in.height, cells);
   std::vector<float> prior = everywhere;
   prior.resize(static_cast<size_t>(m));
   const Buffer<float> of_whole = device.upload(std::span(std::as_const(prior)));

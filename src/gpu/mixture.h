@@ -28,6 +28,7 @@ struct MixtureBuffers {
   std::array<const Buffer<float>*, 2> counts = {};       ///< weights of squared errors (error_weights())
   const Buffer<unsigned char>* valid = nullptr;
   float bias_share = 1;
+  bool of_pair = false;  ///< counts are 1 / (F'^2 + 0.01) of each half's base
   float prior = 0;
   bool planted_bug = false;
 };

@@ -9,6 +9,7 @@
 #include "film/groups.h"
 #include "filters/relative_counts.h"
 #include "gpu/launch.h"
+#include "gpu/residual_correction.h"
 
 namespace covary::gpu {
 namespace {
@@ -39,10 +40,7 @@ void write_network_candidates(Device& device, const Groups& groups, const PartBu
   const auto pixels = static_cast<size_t>(groups.pixels());
   const int width = groups.width, height = groups.height;
   const Buffer<float> image = device.upload(std::span(clean.data));
-  const auto guide = device.make<float>(4 * pixels), other = device.make<float>(4 * pixels);
-  const Buffer<float>& counts = relative_counts ? relative_counts : image;  // not read without them
-  device.launch(kernel(device, "residual_input", 1), list_of(pixels), kOfList, part.noisy(), counts,
-                int{static_cast<bool>(relative_counts)}, groups.pixels(), guide, other);
+  const auto& [guide, other] = residual_input(device, part.noisy(), part.independent.variance_of_mean, relative_counts);
   device.launch(device.kernel("group_moments.cl", "scaled", with_bug({}, false)), list_of(3 * pixels), kOfList, image,
                 1.0f, 3 * groups.pixels(), results);
   size_t first = 0;

@@ -53,13 +53,12 @@ Method denoised_pair(DenoiseMode mode, bool on_device) {
   return with_denoising(make_estimator(kIicv), options);
 }
 
-TEST(GpuPairDenoising, IsThatOfTheProcessor) {
-  Pair in;
+void expect_same(Pair& in, DenoiseMode mode) {
   for (const bool has_features : {true, false}) {
     SCOPED_TRACE(has_features);
     in.settings.features = has_features ? Features{&in.albedo, &in.normal} : Features{};
-    const auto expected = denoised_pair(DenoiseMode::kAuto, false).image(in.samples(), in.settings),
-               found = denoised_pair(DenoiseMode::kAuto, true).image(in.samples(), in.settings);
+    const auto expected = denoised_pair(mode, false).image(in.samples(), in.settings),
+               found = denoised_pair(mode, true).image(in.samples(), in.settings);
     EXPECT_TRUE(agree(expected.estimate.data, found.estimate.data));
     EXPECT_TRUE(agree(expected.std_error.data, found.std_error.data));
     EXPECT_TRUE(agree(expected.bias.data, found.bias.data));
@@ -74,6 +73,28 @@ TEST(GpuPairDenoising, IsThatOfTheProcessor) {
                   1e-3 * expected.risks->images[i].relmse);
     }
   }
+}
+
+TEST(GpuPairDenoising, IsThatOfTheProcessor) {
+  Pair in;
+  expect_same(in, DenoiseMode::kAuto);
+}
+
+/// With residual correction, whose weights follow the pixels' numbers of samples.
+TEST(GpuPairDenoising, LowersBiasAsTheProcessorDoes) {
+  Pair in;
+  expect_same(in, DenoiseMode::kBias);
+  for (int i = 0; i < kWidth * kHeight; ++i) in.independent.counts.push_back(8 + static_cast<uint32_t>(i % 5 * 8));
+  expect_same(in, DenoiseMode::kBalanced);
+}
+
+TEST(GpuPairDenoising, NoticesAWrongCorrection) {
+  Pair in;
+  DenoisingParts parts = parts_of_pair(make_estimator(kIicv), in.crn.view(), in.independent.view(), in.settings);
+  const PairMixture request{&parts, {4, 0, true}, {}, false, false};
+  const MixedDenoising right = mix_pair(test_device(), request),
+                       wrong = mix_pair(test_device(), request, {"residual_correction.cl", 0, {}});
+  EXPECT_FALSE(agree(right.result.estimate.data, wrong.result.estimate.data));
 }
 
 TEST(GpuPairDenoising, TakesTheImagesOfANetwork) {
@@ -101,7 +122,7 @@ TEST(GpuPairDenoising, TakesTheImagesOfANetwork) {
   EXPECT_TRUE(agree(expected.result.estimate.data, found.result.estimate.data));
 }
 
-/// Of the command line's method; what devices cannot do is told.
+/// Of the command line's method.
 TEST(GpuPairDenoising, IsPartOfTheDefault) {
   const Pair in;
   const auto target = std::make_shared<Target>(device::Device::open("opencl"), false);
@@ -110,7 +131,7 @@ TEST(GpuPairDenoising, IsPartOfTheDefault) {
   };
   EXPECT_EQ(picture(DenoisingChoice::kAuto).note, "");
   EXPECT_EQ(target->made_by(), target->info().text());
-  EXPECT_EQ(picture("bias").note, "images of a pair with less bias are denoised on the processor, not on the device");
+  EXPECT_EQ(picture("bias").note, "");
 }
 
 }  // namespace

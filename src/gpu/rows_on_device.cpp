@@ -10,6 +10,7 @@
 #include "denoising/weighed_candidate.h"
 #include "gpu/held_out.h"
 #include "gpu/network_candidates.h"
+#include "gpu/residual_correction.h"
 
 namespace covary::gpu {
 
@@ -113,7 +114,7 @@ MixtureBuffers RowsOnDevice::mixture_input() {
     in.counts[half] = &counts_[half];
   }
   in.valid = &groups_.valid;
-  in.bias_share = weighting_.bias_share;
+  in.bias_share = weighting_.bias_share, in.of_pair = !is_mean();
   in.prior = is_mean() ? kPriorOfMean : weighting_.prior;
   return in;
 }
@@ -134,6 +135,7 @@ std::vector<NormalRow> RowsOnDevice::normal_rows(int first, int end) {
 
 MixedRows RowsOnDevice::mix(const std::vector<float>& everywhere) {
   stages_.run("mixture", [&] { mixed_ = gpu::mix(device_, mixture_input(), everywhere); });
+  if (weighting_.residual_correction && !is_mean()) stages_.run("residual correction", [&] { correct_residual(); });
   MixedRows rows;
   stages_.run("copy picture", [&] { rows.result.estimate = downloaded(mixed_.image, 3); });
   const bool network = has_network(makers_);
@@ -143,6 +145,18 @@ MixedRows RowsOnDevice::mix(const std::vector<float>& everywhere) {
     rows.result.risk_kind = network ? ErrorKind::kPairNetwork : ErrorKind::kPairFilters;
   if (std_error_) stages_.run("errors, with their copies", [&] { find_errors(rows); });
   return rows;
+}
+
+void RowsOnDevice::correct_residual() {
+  const std::array<const Buffer<float>*, 3> images = {&mixed_.image, &mixed_.halves[0], &mixed_.halves[1]};
+  for (size_t i = 0; i < images.size(); ++i) {
+    const PartBuffers& part = parts_[i];
+    const ResidualInput input =
+        residual_input(device_, part.independent.mean, part.independent.variance_of_mean, part.relative_count);
+    gpu::correct_residual(device_, stages_,
+                          {groups_.width, groups_.height, &input.guide, &input.other, &groups_.valid, &part.std_error},
+                          {}, *images[i]);
+  }
 }
 
 void RowsOnDevice::find_errors(MixedRows& rows) {

@@ -59,6 +59,7 @@ class RowsOnDevice {
   MixtureBuffers mixture_input();
   LayerBuffers upload_layer(const Layer& layer);
   WeighingBuffers weighing_input(size_t part) const;
+  void correct_residual();
   void find_errors(MixedRows& rows);
   Image downloaded(const Buffer<float>& buffer, int channels, size_t first = 0);
   std::vector<Image> downloaded_images(const Buffer<float>& buffer, int channels);

@@ -33,13 +33,13 @@ KERNEL error_weights(GLOBAL const float* guide, GLOBAL const float* std_error, i
 // Adds the normal equations of pixel i to `sums`. base_a, candidates_a: of half A; h_a: its independent image.
 FUNCTION void add_pixel(GLOBAL const float* base_a, GLOBAL const float* base_b, GLOBAL const float* candidates_a,
                         GLOBAL const float* candidates_b, GLOBAL const float* h_a, GLOBAL const float* h_b,
-                        GLOBAL const float* counts_a, GLOBAL const float* counts_b, float bias_share, int n_pixels,
-                        int i, float* sums) {
+                        GLOBAL const float* counts_a, GLOBAL const float* counts_b, float bias_share, int of_pair,
+                        int n_pixels, int i, float* sums) {
   const float weight_a = counts_a[i], weight_b = counts_b[i];
-  // The halves' squared error minus (1 - 1 / bias_share) variance; the smaller weight counts, because a firefly has a
-  // small one in its own half.
+  // The halves' squared error minus (1 - 1 / bias_share) variance. Of a mean, the smaller weight counts, because a
+  // firefly has a small one in its own half.
   const float variance = 0.25f * (weight_a + weight_b);
-  const float removed = (1 - 1 / bias_share) * 0.5f * min(weight_a, weight_b);
+  const float removed = (1 - 1 / bias_share) * (of_pair ? variance : 0.5f * min(weight_a, weight_b));
   for (int c = 0; c < 3; ++c) {
     const int k = 3 * i + c;
     const float f_a = base_a[k], f_b = base_b[k];
@@ -69,7 +69,8 @@ FUNCTION void add_pixel(GLOBAL const float* base_a, GLOBAL const float* base_b, 
 KERNEL normal_cells(GLOBAL const float* guide, GLOBAL const float* base_a, GLOBAL const float* base_b,
                     GLOBAL const float* candidates_a, GLOBAL const float* candidates_b, GLOBAL const float* h_a,
                     GLOBAL const float* h_b, GLOBAL const float* counts_a, GLOBAL const float* counts_b,
-                    GLOBAL const uchar* valid, float bias_share, int width, int height, GLOBAL float* cells) {
+                    GLOBAL const uchar* valid, float bias_share, int of_pair, int width, int height,
+                    GLOBAL float* cells) {
   const int columns = (width + CELL - 1) / CELL, rows = (height + CELL - 1) / CELL;
   const int column = get_global_id(0), row = get_global_id(1);
   if (column >= columns || row >= rows) return;
@@ -82,8 +83,8 @@ KERNEL normal_cells(GLOBAL const float* guide, GLOBAL const float* base_a, GLOBA
       if (!valid[i]) continue;
       for (int c = 0; c < 3; ++c) mean[c] += guide[3 * i + c];
       ++n;
-      add_pixel(base_a, base_b, candidates_a, candidates_b, h_a, h_b, counts_a, counts_b, bias_share, width * height, i,
-                sums);
+      add_pixel(base_a, base_b, candidates_a, candidates_b, h_a, h_b, counts_a, counts_b, bias_share, of_pair,
+                width * height, i, sums);
     }
   const size_t cell = (size_t)row * columns + column, plane = (size_t)rows * columns;
   for (int c = 0; c < 3; ++c) cells[c * plane + cell] = n > 0 ? mean[c] / (float)n : FAR;
@@ -95,7 +96,7 @@ KERNEL normal_cells(GLOBAL const float* guide, GLOBAL const float* base_a, GLOBA
 KERNEL normal_parts(GLOBAL const float* base_a, GLOBAL const float* base_b, GLOBAL const float* candidates_a,
                     GLOBAL const float* candidates_b, GLOBAL const float* h_a, GLOBAL const float* h_b,
                     GLOBAL const float* counts_a, GLOBAL const float* counts_b, GLOBAL const uchar* valid,
-                    float bias_share, int width, int height, int first_row, int n_rows, int part,
+                    float bias_share, int of_pair, int width, int height, int first_row, int n_rows, int part,
                     GLOBAL float* parts) {
   const int n_parts = (width + part - 1) / part, number = get_global_id(0), row = get_global_id(1);
   if (number >= n_parts || row >= n_rows) return;
@@ -104,8 +105,8 @@ KERNEL normal_parts(GLOBAL const float* base_a, GLOBAL const float* base_b, GLOB
   for (int x = part * number; x < min(width, part * (number + 1)); ++x) {
     const int i = (first_row + row) * width + x;
     if (valid[i])
-      add_pixel(base_a, base_b, candidates_a, candidates_b, h_a, h_b, counts_a, counts_b, bias_share, width * height, i,
-                sums);
+      add_pixel(base_a, base_b, candidates_a, candidates_b, h_a, h_b, counts_a, counts_b, bias_share, of_pair,
+                width * height, i, sums);
   }
   for (int k = 0; k < SUMS; ++k) parts[((size_t)row * n_parts + number) * SUMS + k] = sums[k];
 }

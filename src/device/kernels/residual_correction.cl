@@ -122,14 +122,15 @@ KERNEL correct_again(GLOBAL const float* RESTRICT guides, GLOBAL const float* RE
   for (int c = 0; c < 3; ++c) estimate[3 * (size_t)p + c] = f[c] + b * value_of(&mean, c);
 }
 
-// What residual_cells reads, from the mean h of an image and the numbers of samples of its pixels relative to their
-// mean, 1 without them.
-KERNEL residual_input(GLOBAL const float* RESTRICT h, GLOBAL const float* RESTRICT relative_counts, int has_counts,
-                      int n_pixels, GLOBAL float* RESTRICT guide, GLOBAL float* RESTRICT other) {
+// What residual_cells reads, from the mean h of an image with its variance, and the numbers of samples of its pixels
+// relative to their mean, 1 without them.
+KERNEL residual_input(GLOBAL const float* RESTRICT h, GLOBAL const float* RESTRICT variance,
+                      GLOBAL const float* RESTRICT relative_counts, int has_counts, int n_pixels, GLOBAL float* RESTRICT guide, GLOBAL float* RESTRICT other) {
   const int p = get_global_id(0);
   if (p >= n_pixels) return;
   vstore4(FLOAT4(0.0f, 0.0f, 0.0f, has_counts ? relative_counts[p] : 1.0f), p, guide);
-  vstore4(FLOAT4(h[3 * (size_t)p], h[3 * (size_t)p + 1], h[3 * (size_t)p + 2], 0.0f), p, other);
+  GLOBAL const float *mean = h + 3 * (size_t)p, *v = variance + 3 * (size_t)p;
+  vstore4(FLOAT4(mean[0], mean[1], mean[2], v[0] + v[1] + v[2]), p, other);
 }
 
 // The estimate with its residual (ResidualOptions), from element `first` of `result` on, one item a pixel: means over
