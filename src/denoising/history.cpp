@@ -18,12 +18,6 @@ constexpr int kErrorWindow = 5;     // side, pixels
 constexpr float kMinScale = 0.02f;  // added to colours that divide standard errors
 /// The most by which features may change a history, relative to its colour.
 constexpr float kMaxOfColour = 0.2f;
-/// MixtureInput::prior
-constexpr float kPrior = 2;
-/// MixtureInput::bias_share. Halves have twice the variance of the frame but the same history, whose error is all bias
-/// to them: 2 would be right for the whole frame. But windows of few samples overrate that error
-/// (docs/notes/sequences.md).
-constexpr float kShare = 1.4f;
 
 /// 1 / (1 + e / s'^2): trust in resampled history beside an image of the frame whose standard error is `scale` times
 /// that of the whole; 0 without history.
@@ -147,8 +141,8 @@ Mixture mixture_of(const HistoryInput& input, const CandidateSet& whole, const s
   of_history.independent = input.independent;
   of_history.guide = input.guide;
   of_history.valid = input.valid;
-  of_history.prior = kPrior;
-  of_history.bias_share = kShare;
+  of_history.prior = kPriorOfHistory;
+  of_history.bias_share = kShareOfHistory;
   of_history.counts = input.counts;
   return mix(of_history);
 }

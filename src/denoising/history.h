@@ -66,6 +66,13 @@ void follow_features(History& history, const Image& albedo, const Image& normal)
 /// Layers of a frame's file with R'_A, R'_B, albedo and normal: EstimatorResult::kept_samples.
 inline constexpr std::array<const char*, 4> kKeptSamples = {"HistoryA", "HistoryB", "HistoryAlbedo", "HistoryNormal"};
 
+/// MixtureInput::prior
+inline constexpr float kPriorOfHistory = 2;
+/// MixtureInput::bias_share. Halves have twice the variance of the frame but the same history, whose error is all bias
+/// to them: 2 would be right for the whole frame. But windows of few samples overrate that error
+/// (docs/notes/sequences.md).
+inline constexpr float kShareOfHistory = 1.4f;
+
 struct HistoryInput {
   std::array<const Moments*, 2> independent = {};     ///< as in MixtureInput
   const Image* std_error = nullptr;                   ///< of the mixture

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "denoising/candidates.h"
+#include "denoising/denoising_choice.h"
 #include "denoising/parts_mixture.h"
 #include "estimators/method.h"
 #include "film/grouped_image.h"
@@ -27,6 +28,7 @@ struct MeanMixture {
   std::span<const Layer> layers = {};  ///< to be denoised with the mixture's weights (layers.h)
   /// What the network makes of layers; empty: without one.
   std::function<NetworkLayers(std::vector<Image> noisy)> network_of_layers = {};
+  MixingHistory history = {};  ///< of a frame, following its features
 };
 
 /// The image of an estimator of two passes.
@@ -35,6 +37,7 @@ struct PairMixture {
   PartsWeighting weighting;
   std::function<NetworkImages()> network;  ///< of the independent images; their candidate comes last; empty: without
   bool std_error = false, stages = false;  ///< as for a mean
+  MixingHistory history = {};              ///< likewise
 };
 
 }  // namespace covary

@@ -139,21 +139,30 @@ MixedDenoising single_candidate(const GroupedImage& independent, const std::vect
 /// Shared by the image and its stages; `stages`: candidates and weights are wanted.
 using Run = std::function<MixedDenoising(const Samples& samples, const MethodSettings& settings, bool stages)>;
 
-/// denoise_by_mixture(), with the frame's features applied to the history and kept for the next frame.
+/// The history with the frame's features applied to it.
+MixingHistory history_of_frame(const MixedDenoisingOptions& options, const Features& features) {
+  MixingHistory history = options.history;
+  if (!history.before || !features.albedo || !features.normal) return history;
+  const auto before = std::make_shared<History>(*history.before);
+  follow_features(*before, *features.albedo, *features.normal);
+  history.before = before;
+  return history;
+}
+
+/// Keeps the frame's features for the next one.
+void keep_features(const MixedDenoisingOptions& options, const Features& features, MethodImage& result) {
+  if (!options.history.keep_samples || !features.albedo || !features.normal) return;
+  result.kept_samples[2] = *features.albedo, result.kept_samples[3] = *features.normal;
+}
+
+/// denoise_by_mixture() of a frame.
 MixedDenoising denoise_frame(DenoisingParts parts, const std::vector<CandidateMaker>& makers,
                              const MixedDenoisingOptions& options, const MethodSettings& settings,
                              std::span<const Layer> layers) {
-  const Image *const albedo = settings.features.albedo, *const normal = settings.features.normal;
-  const bool has_features = albedo && normal;
-  MixingHistory history = options.history;
-  if (history.before && has_features) {
-    const auto before = std::make_shared<History>(*history.before);
-    follow_features(*before, *albedo, *normal);
-    history.before = before;
-  }
   parts.features = settings.features;
-  MixedDenoising out = denoise_by_mixture(std::move(parts), makers, options.mode, settings.std_error, layers, history);
-  if (history.keep_samples && has_features) out.result.kept_samples[2] = *albedo, out.result.kept_samples[3] = *normal;
+  MixedDenoising out = denoise_by_mixture(std::move(parts), makers, options.mode, settings.std_error, layers,
+                                          history_of_frame(options, settings.features));
+  keep_features(options, settings.features, out.result);
   return out;
 }
 
@@ -183,19 +192,18 @@ Run run_of_pair(const Method& base, const MixedDenoisingOptions& options, bool w
       if (with_oidn) makers.push_back(neural_candidates(settings.features, options.oidn));
       return denoise_frame(std::move(parts), makers, options, settings, {});
     };
-    if (!options.mix_pair || options.history.is_used()) {
-      MixedDenoising out = here();
-      tell_that_made_here(options, "frames with a history", out.result);
-      return out;
-    }
-    PairMixture request{&parts, settings_of(options.mode).weighting, {}, settings.std_error, stages};
+    if (!options.mix_pair) return here();
+    PairMixture request{&parts, settings_of(options.mode).weighting,         {}, settings.std_error,
+                        stages, history_of_frame(options, settings.features)};
     if (with_oidn)
       request.network = [&] {
         return network_images(settings.features, options.oidn,
                               {mean_image(parts.whole.independent), mean_image(parts.halves[0].independent),
                                mean_image(parts.halves[1].independent)});
       };
-    return options.mix_pair(request, here);
+    MixedDenoising out = options.mix_pair(request, here);
+    keep_features(options, settings.features, out.result);
+    return out;
   };
 }
 
@@ -213,10 +221,9 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
       return denoise_frame(parts_of_mean(independent), makers, options, settings, settings.layers);
     };
     if (!options.mix_mean) return here();
-    if (options.history.is_used() || !can_be_mixed(independent)) {
+    if (!can_be_mixed(independent)) {
       MixedDenoising out = here();
-      tell_that_made_here(options, options.history.is_used() ? "frames with a history" : "images of very few samples",
-                          out.result);
+      tell_that_made_here(options, "images of very few samples", out.result);
       return out;
     }
     MeanMixture request{independent, settings.features,  kinds,  settings_of(options.mode).weighting,
@@ -225,7 +232,10 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
       const NetworkCalls network = network_calls(settings.features, options.oidn);
       request.network = network.images, request.network_of_layers = network.layers;
     }
-    return options.mix_mean(request, here);
+    request.history = history_of_frame(options, settings.features);
+    MixedDenoising out = options.mix_mean(request, here);
+    keep_features(options, settings.features, out.result);
+    return out;
   };
 }
 

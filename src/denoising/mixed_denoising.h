@@ -46,7 +46,7 @@ struct MixedDenoisingOptions {
   bool use_oidn = true;  ///< use Open Image Denoise if it is installed
   DenoiseOptions oidn;   ///< its library; it is an error if a given path has none
   MixingHistory history;
-  /// Makes the mixture of a mean without history elsewhere, such as on a GPU, or by calling `here`; empty:
+  /// Makes the mixture of a mean elsewhere, such as on a GPU, or by calling `here`; empty:
   /// here.
   std::function<MixedDenoising(const MeanMixture&, const std::function<MixedDenoising()>& here)> mix_mean;
   /// Same for a pair.

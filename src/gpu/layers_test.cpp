@@ -29,7 +29,8 @@ namespace {
 using test_support::agree;
 using test_support::test_device;
 
-/// A picture with fireflies and a pixel that is left out: two layers that are parts of it, in unequal shares, and alpha.
+/// A picture with fireflies and a pixel that is left out: two layers that are parts of it, in unequal shares, and
+/// alpha.
 struct LayeredPicture {
   int width, height;
   test::Grouped all, direct, indirect, alpha;

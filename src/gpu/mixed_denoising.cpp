@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gpu/mixed_denoising.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <optional>
 #include <utility>
 
 #include "denoising/denoising_parts.h"
+#include "denoising/history.h"
 #include "denoising/layers.h"
 #include "denoising/mixed_rows.h"
 #include "denoising/row_bands.h"
@@ -34,6 +37,55 @@ struct BandOnDevice {
   }
 };
 
+/// Weights of the whole image, whose rows these are.
+std::vector<float> weights_of_all(RowsOnDevice& rows, bool is_mean, const PartsWeighting& weighting,
+                                  const GroupedImage& image) {
+  std::vector<NormalRow> all;
+  for (const auto& [first, end] : sampled_rows(image.width, image.height)) {
+    const std::vector<NormalRow> some = rows.normal_rows(first, end);
+    all.insert(all.end(), some.begin(), some.end());
+  }
+  return weights_of_whole(is_mean, rows.makers(), weighting, mean_samples(image), all);
+}
+
+/// Errors that only the history needed.
+void forget_unwanted_errors(bool std_error, MethodImage& result) {
+  if (std_error) return;
+  result.std_error = {}, result.bias = {}, result.risk_rows.clear(), result.risks.reset();
+}
+
+/// The mixture of independent samples whose halves have these means.
+class SamplesMixture {
+ public:
+  /// `runs`: becomes the number of the network's runs so far.
+  SamplesMixture(Device& device, const MeanMixture& frame, const std::array<Image, 2>& halves, const Trial& trial,
+                 int& runs)
+      : groups_(groups_of(halves)), request_(frame) {
+    request_.independent = {halves[0].width, halves[0].height, 2, groups_.data()};
+    request_.std_error = false, request_.layers = {}, request_.history = {};
+    rows_.emplace(device, request_, trial);
+    NetworkImages network;
+    Stages(device, trial).run("network", [&] { network = request_.network(rows_->noisy()); });
+    runs = network.runs;
+    rows_->make_candidates(&network);
+    rows_->mix(weights_of_all(*rows_, true, request_.weighting, request_.independent));
+  }
+  const MixedBuffers& mixed() const { return rows_->mixed(); }
+
+ private:
+  static std::vector<float> groups_of(const std::array<Image, 2>& halves) {
+    std::vector<float> data;
+    data.reserve(2 * halves[0].data.size());
+    for (size_t i = 0; i < halves[0].data.size(); i += 3)
+      for (const Image& half : halves) data.insert(data.end(), &half.data[i], &half.data[i] + 3);
+    return data;
+  }
+
+  const std::vector<float> groups_;
+  MeanMixture request_;
+  std::optional<RowsOnDevice> rows_;
+};
+
 class MeanDenoising {
  public:
   MeanDenoising(Device& device, const MeanMixture& request, const Trial& trial)
@@ -54,12 +106,17 @@ class MeanDenoising {
       makers = rows.makers();
       append(rows.mix(everywhere), band.skipped, band.y, band.n, height_, whole);
       whole.result.nonfinite_pixels += rows.unusable(band.skipped, band.n);
-      append_layers(rows, band, whole.result.layers);
+      if (!request_.history.is_used()) append_layers(rows, band, whole.result.layers);
       if (request_.stages) append_stages(rows, band, out);
     }
     out.names = names_of(makers);
     std::vector<Image> layers = std::move(whole.result.layers);
     out.result = finish(std::move(whole), makers, "mean");
+    if (request_.history.is_used()) {
+      use_history(out.result);
+      append_layers(*last_->rows, last_->band, layers);
+      if (request_.stages) out.weights = last_->rows->weights();
+    }
     add_up(out.result.estimate, request_.layers, layers);
     out.result.layers = std::move(layers);
     out.result.network_runs = std::max(network_.runs, network_layers_.runs);
@@ -96,6 +153,24 @@ class MeanDenoising {
       rows.make_candidates(&part);
     }
     return rows;
+  }
+
+  /// denoising/frame_history.h; the image is in one band.
+  void use_history(MethodImage& result) {
+    const MixingHistory& use = request_.history;
+    RowsOnDevice& rows = *last_->rows;
+    std::optional<FrameHistory> history;
+    if (use.before) history.emplace(rows.history_of(*use.before, result.std_error));
+    if (use.keep_samples) result.kept_samples.resize(kKeptSamples.size());
+    const bool has_samples = has_network() && use.before && !use.before->samples[0].data.empty();
+    std::optional<SamplesMixture> accumulated;
+    if (has_network() && (has_samples || use.keep_samples)) {
+      std::array<Image, 2> halves = rows.halves_with_samples(has_samples ? &*history : nullptr);
+      if (has_samples) accumulated.emplace(device_, request_, halves, trial_, network_.runs);
+      if (use.keep_samples) std::ranges::move(halves, result.kept_samples.begin());
+    }
+    if (history) result.estimate = rows.add_history(*history, accumulated ? &accumulated->mixed() : nullptr);
+    forget_unwanted_errors(request_.std_error, result);
   }
 
   void run_network() {
@@ -170,14 +245,21 @@ MixedDenoising mix_mean(Device& device, const MeanMixture& request, const Trial&
   needs.bytes_per_pixel = bytes_of_mean(image.groups) + (request.layers.empty() ? 0 : bytes_of_layer(image.groups));
   needs.largest_buffer_per_pixel = largest_buffer_of_mean(image.groups);
   const int halo = mixed_halo(CandidateBase::kMean, static_cast<bool>(request.network), kMeanHalo, request.weighting);
+  const bool is_whole = request.history.is_used();
+  if (is_whole) needs.bytes_per_pixel += kBytesOfHistory + (request.network ? bytes_of_mean(2) : 0);
   int rows =
       trial.rows_at_once > 0 ? trial.rows_at_once : rows_that_fit(device.info(), image.width, image.height, needs);
+  if (is_whole && rows < image.height)
+    throw device::Failure(device::FailureKind::kMemory,
+                          fmt::format("frames with a history are denoised as a whole, and the device's memory holds "
+                                      "{} of {} rows",
+                                      rows, image.height));
   MeanDenoising denoising(device, request, trial);
   while (true) {
     try {
       return denoising.run(rows);
     } catch (const device::Failure& failure) {
-      if (failure.kind() != device::FailureKind::kMemory || rows < 2 * halo) throw;
+      if (failure.kind() != device::FailureKind::kMemory || rows < 2 * halo || is_whole) throw;
       rows = std::min(rows, image.height) / 2;
     }
   }
@@ -189,18 +271,16 @@ MixedDenoising mix_pair(Device& device, const PairMixture& request, const Trial&
   if (request.network) Stages(device, trial).run("network", [&] { network = request.network(); });
   rows.make_candidates(request.network ? &network : nullptr);
   const DenoisingParts& parts = *request.parts;
-  std::vector<NormalRow> all;
-  for (const auto& [first, end] : sampled_rows(parts.groups.width, parts.groups.height)) {
-    const std::vector<NormalRow> some = rows.normal_rows(first, end);
-    all.insert(all.end(), some.begin(), some.end());
-  }
-  MixedRows mixed =
-      rows.mix(weights_of_whole(false, rows.makers(), request.weighting, mean_samples(parts.groups), all));
+  MixedRows mixed = rows.mix(weights_of_all(rows, false, request.weighting, parts.groups));
   mixed.result.nonfinite_pixels = parts.whole.image.nonfinite_pixels;
   MixedDenoising out;
   out.names = names_of(rows.makers());
   out.result = finish(std::move(mixed), rows.makers(), parts.name);
   out.result.network_runs = network.runs;
+  if (request.history.keep_samples) out.result.kept_samples.resize(kKeptSamples.size());
+  if (request.history.before)
+    out.result.estimate = rows.add_history(rows.history_of(*request.history.before, out.result.std_error), nullptr);
+  forget_unwanted_errors(request.std_error, out.result);
   if (request.stages) out.candidates = rows.candidates(), out.weights = rows.weights();
   return out;
 }

@@ -56,7 +56,7 @@ std::vector<NormalRow> normal_rows(Device& device, const MixtureBuffers& in, int
 MixedBuffers mix(Device& device, const MixtureBuffers& in, const std::vector<float>& everywhere) {
   COVARY_CHECK(in.candidates >= 1 && in.candidates <= kMaxCandidates, "between one and kMaxCandidates candidates");
   const int columns = cells_in(in.width), rows = cells_in(in.height), m = in.candidates;
-  const Buffer<float>& guide = *in.whole.candidates;
+  const Buffer<float>& guide = in.guide ? *in.guide : *in.whole.candidates;
   const auto cells = device.make<float>(static_cast<size_t>(columns) * rows * (3 + n_normal_sums(m)));
   device.launch(kernel(device, "normal_cells", m, in.planted_bug), image_of(columns, rows), kOfImage, guide,
                 *in.halves[0].base, *in.halves[1].base, *in.halves[0].candidates, *in.halves[1].candidates,

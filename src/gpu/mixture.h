@@ -26,6 +26,7 @@ struct MixtureBuffers {
   std::array<CandidateBuffers, 2> halves;
   std::array<const Buffer<float>*, 2> independent = {};  ///< h_A, h_B
   std::array<const Buffer<float>*, 2> counts = {};       ///< weights of squared errors (error_weights())
+  const Buffer<float>* guide = nullptr;                  ///< null: the first candidate of all samples
   const Buffer<unsigned char>* valid = nullptr;
   float bias_share = 1;
   bool of_pair = false;  ///< counts are 1 / (F'^2 + 0.01) of each half's base
@@ -41,8 +42,7 @@ struct MixedBuffers {
   Buffer<float> image, weights;
   std::array<Buffer<float>, 2> halves;
 };
-/// `everywhere`: the weights of the whole image, which normal_rows() determine. The first candidate of all samples is
-/// the guide.
+/// `everywhere`: the weights of the whole image, which normal_rows() determine.
 MixedBuffers mix(Device& device, const MixtureBuffers& in, const std::vector<float>& everywhere);
 
 /// F + sum_p x_p (C_p - F) of a set, with weights as mix() makes them; from `in`: size, number of candidates, pixels.

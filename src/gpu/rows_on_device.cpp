@@ -24,7 +24,7 @@ RowsOnDevice::RowsOnDevice(Device& device, const MeanMixture& request, const Tri
       auxiliary_(request.features),
       kinds_(request.kinds),
       weighting_(request.weighting),
-      std_error_(request.std_error),
+      std_error_(request.std_error || request.history.is_used()),
       stages_(device, trial) {
   stages_.run("copy samples and auxiliary images", [&] {
     groups_ = upload(device_, independent_);
@@ -40,7 +40,7 @@ RowsOnDevice::RowsOnDevice(Device& device, const PairMixture& request, const Tri
       auxiliary_(request.parts->features),
       kinds_(FilterKinds::kNlMeans),
       weighting_(request.weighting),
-      std_error_(request.std_error),
+      std_error_(request.std_error || request.history.is_used()),
       stages_(device, trial) {
   stages_.run("copy images", [&] {
     groups_ = upload(device_, independent_);
@@ -178,6 +178,35 @@ void RowsOnDevice::find_errors(MixedRows& rows) {
   }
 }
 
+FrameHistory RowsOnDevice::history_of(const History& before, const Image& std_error) {
+  FrameBuffers frame{groups_.width, groups_.height, {}, {}, &candidates_[0], &groups_.valid};
+  for (const int half : {0, 1}) {
+    frame.independent[half] = &parts_[half + 1].independent.mean;
+    if (is_mean()) frame.counts[half] = &counts_[half];
+  }
+  return FrameHistory(device_, before, std_error, frame);
+}
+
+std::array<Image, 2> RowsOnDevice::halves_with_samples(const FrameHistory* history) {
+  if (!history) return {downloaded(parts_[1].image(), 3), downloaded(parts_[2].image(), 3)};
+  std::array<Image, 2> halves;
+  stages_.run("samples of frames before", [&] {
+    const std::array<Buffer<float>, 2> made =
+        history->add_samples(parts_[0].image(), {&parts_[1].image(), &parts_[2].image()});
+    halves = {downloaded(made[0], 3), downloaded(made[1], 3)};
+  });
+  return halves;
+}
+
+Image RowsOnDevice::add_history(const FrameHistory& history, const MixedBuffers* accumulated) {
+  Image picture;
+  stages_.run("history", [&] {
+    history.add_history(accumulated, n_candidates_, mixed_);
+    picture = downloaded(mixed_.image, 3);
+  });
+  return picture;
+}
+
 LayerBuffers RowsOnDevice::upload_layer(const Layer& layer) {
   const bool is_part = layer.sum != Layer::kNoSum;
   if (is_part && !limits_) limits_ = limits_of(device_, groups_, {});
@@ -194,7 +223,7 @@ Image RowsOnDevice::denoised_layer(const Layer& layer, const Image* clean) {
   Image image;
   stages_.run("layers, with their copies", [&] {
     const LayerBuffers means = upload_layer(layer);
-    const auto made = device_.make<float>(3 * pixels() * n_made());
+    auto made = device_.make<float>(3 * pixels() * n_made());
     const int of_network = clean ? kNetworkCandidates : 0;
     for (int p = 0; p < of_network; ++p) device_.write(made, clean->data, 3 * pixels() * p);
     filter(device_, groups_, *features_, base_, parts_[0], false, {&made, 3 * pixels() * of_network}, &means.noisy);

@@ -12,6 +12,7 @@
 #include "denoising/mixed_rows.h"
 #include "gpu/denoising_parts.h"
 #include "gpu/filtered_candidates.h"
+#include "gpu/history.h"
 #include "gpu/layers.h"
 #include "gpu/mixture.h"
 #include "gpu/trial.h"
@@ -38,6 +39,14 @@ class RowsOnDevice {
   std::vector<NormalRow> normal_rows(int first, int end);
   /// The mixture, and what its error needs of these rows. `everywhere`: weights of the whole image.
   MixedRows mix(const std::vector<float>& everywhere);
+  /// For rows that are the whole image, once it is mixed: the frame of a history. `std_error`: of the mixture.
+  FrameHistory history_of(const History& before, const Image& std_error);
+  /// The frame's halves with samples of the history, or its own if there is none.
+  std::array<Image, 2> halves_with_samples(const FrameHistory* history);
+  /// Mixes the history into the picture, which comes back (FrameHistory::add_history()).
+  Image add_history(const FrameHistory& history, const MixedBuffers* accumulated);
+  const MixedBuffers& mixed() const { return mixed_; }
+
   /// A layer of these rows without fireflies: what a network denoises.
   Image noisy_layer(const Layer& layer);
   /// A layer of these rows with the weights of the mixture, once it is made. `clean`: what a network made of the noisy
