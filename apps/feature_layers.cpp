@@ -14,6 +14,7 @@
 #include "core/printable.h"
 #include "film/auxiliary_features.h"
 #include "film/film_file.h"
+#include "film/written_by.h"
 #include "metrics/alignment.h"
 
 namespace covary {
@@ -167,6 +168,7 @@ FeatureLayers::FeatureLayers(const FeatureSearch& search) {
   MeanFeature of_albedo, of_normal, of_position;
   for (const std::string& path : search.files) {
     const ImageInfo info = inspect_image(path);
+    are_own_ = written_by(info.attributes) == Renderer::kCovary;
     const auto feature = [&](const std::string& name, FeatureKind kind) -> std::optional<Image> {
       if (name.empty()) return find_feature(path, info, kind, search.colours, search.picture);
       return named_feature(path, info, kind, search.colours, name);
@@ -184,8 +186,11 @@ Features FeatureLayers::view() const {
   return {or_null(albedo), or_null(normal), nullptr, nullptr, or_null(position)};
 }
 
-const char* FeatureLayers::text() const {
-  return normal ? "guided by albedo and normal" : albedo ? "guided by albedo" : "without auxiliary features";
+std::string FeatureLayers::text() const {
+  return normal ? "guided by albedo and normal"
+         : albedo
+             ? "guided by albedo"
+             : std::string("without auxiliary features") + (are_own_ ? ", which `covary render --aovs` writes" : "");
 }
 
 }  // namespace covary

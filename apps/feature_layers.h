@@ -76,7 +76,10 @@ struct FeatureLayers {
 
   explicit FeatureLayers(const FeatureSearch& search);
   Features view() const;
-  const char* text() const;
+  std::string text() const;
+
+ private:
+  bool are_own_ = false;  // files of covary
 };
 
 }  // namespace covary

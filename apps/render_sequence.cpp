@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "core/stopwatch.h"
 #include "core/unfinished.h"
+#include "denoising/mixed_denoising.h"
 #include "film/image_file.h"
 #include "io/scene_formats.h"
 #include "passes/motion.h"
@@ -42,6 +43,11 @@ void check(const RenderOptions& options) {
     usage("--history is for frames with --denoise, and without --layers");
   if (options.sequence.history && options.sequence.frames->step != 1)
     usage("--history has no effect with a step in --frames: it is that of the frame just before");
+  if (options.sequence.history && request.spp && *request.spp < kMinMixedSamples)
+    usage(fmt::format(
+        "--history has no effect with fewer than {} samples per pixel (--spp {}), which do not tell where it "
+        "is right",
+        kMinMixedSamples, *request.spp));
   for (const auto& [name, path] :
        {std::pair{"-o", request.output}, {"--passes", request.passes}, {"--json", options.json}})
     if (!path.empty() && !is_frame_pattern(path))

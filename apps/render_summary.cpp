@@ -168,7 +168,8 @@ void print_frame(const RenderReport& report, const std::string& frame) {
   if (report.options.verbose) print_details(report);
   print_warnings(report);
   const PhaseTimes times = phase_times(report);
-  fmt::print(stderr, "{}: {} in {}{}\n", frame, report.options.request().output,
+  fmt::print(stderr, "{}: {}{} in {}{}\n", frame, report.options.request().output,
+             report.options.settings.denoising.history.before ? ", with the frame before," : "",
              seconds_text(times.total() - times.loading), report.result.predicted ? "; " + quality_text(report) : "");
 }
 

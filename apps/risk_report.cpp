@@ -54,7 +54,9 @@ Quality::Quality(const PredictedError& predicted, const std::optional<MeasuredRi
   relmse = by_few ? of_blocks : predicted.relmse;
   text = fmt::format("{} {} {} left{}", by_few ? "at most" : "about", percent_text(relmse), blurred ? "error" : "grain",
                      by_few ? " in 95 % of the picture, more in few bright pixels" : "");
-  if (!predicted.doubt.empty()) text += " (unsure: `--verbose` says why)";
+  constexpr size_t kShort = 50;
+  const std::string& doubt = predicted.doubt;
+  if (!doubt.empty()) text += fmt::format(" (unsure: {})", doubt.size() <= kShort ? doubt : "`--verbose` says why");
 }
 
 void add_prediction(const PredictedError& predicted, nlohmann::ordered_json& json) {

@@ -23,7 +23,7 @@ std::string prediction_text(const PredictedError& predicted, const std::optional
 /// "4.2 %": how much of a picture is noise or blur, as a fraction of its brightness, the root of relMSE.
 std::string percent_text(double relmse);
 
-/// The predicted error in plain words: "about 4.2 % grain left (unsure: `--verbose` says why)".
+/// The predicted error in plain words: "about 4.2 % grain left (unsure: known to a factor of 3)".
 struct Quality {
   std::string text;
   double relmse = 0;  ///< the error that it names

@@ -12,6 +12,7 @@ from ._arguments import (
     Rule, array, check_names, check_some, checked, either, empty_or, flag, function, mapping_of, optional, path, text,
     whole,
 )
+from ._images import warn_of_features
 from ._options import DEFAULT, DEFAULT_OF_PAIRS, check_no_passes, declared_rules, text_options
 from ._result import Result
 from .errors import InputError, UsageError, _warn
@@ -77,6 +78,7 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, l
     have.
     """
     found: list[str] = []
+    warn_of_features(albedo, normal)
     crn, independent = _groups_first("crn", crn, found), _groups_first("independent", independent, found)
     if crn is None and not hasattr(independent, "samples_per_pixel"):
         counts, samples = _alone(independent, counts, samples)

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from . import _covary
 from ._arguments import array, attribute_texts, checked, either, empty_or, flag, list_of, optional, path, text
+from .errors import _warn
 
 if TYPE_CHECKING:
     from ._result import FloatArray
 
+_MUCH, _MANY = 1.5, 0.01  # a value of a feature, and a share of them, that cannot be right
 _FILES = either("the name of a file, or a list of them", path, list_of(path, "a list of names of files"))
 
 
@@ -43,12 +45,28 @@ def read_groups(paths: str | PathLike[str] | Iterable[str | PathLike[str]], laye
     return groups
 
 
+def warn_of_features(albedo: Any, normal: Any) -> None:
+    """Of images that are something else, such as another render, or normals of 8 bits."""
+    import numpy
+
+    for name, image, within in (("albedo", albedo, "0 and 1"), ("normal", normal, "-1 and 1")):
+        values = numpy.zeros(1) if image is None else numpy.asarray(image)
+        beyond = float(numpy.mean(numpy.abs(values) > _MUCH)) if values.dtype.kind in "fiu" else 0  # else refused later
+        if beyond > _MANY:
+            _warn(f"{name}: {beyond:.0%} of its values are far from between {within}; expected features of surfaces. "
+                  "Several renders are denoised by combine(None, [first, second])")
+
+
 @checked(image=array, albedo=array, normal=array, oidn=empty_or(path))
 def denoise(image: Any, albedo: Any = None, normal: Any = None, *, oidn: str | PathLike[str] = "") -> FloatArray:
     """Denoises the image [H, W, 3] with Open Image Denoise, if installed (`pip install pyoidn`). Biased.
 
     albedo, normal: features [H, W, 3], the normal only together with the albedo.
     oidn: its file or folder, as `covary denoise --oidn` takes it.
+
+    Several renders of other seeds are denoised, with their error, by `combine(None, [first, second])`, which is what
+    the command `covary denoise first.exr second.exr` does.
     """
+    warn_of_features(albedo, normal)
     denoised: FloatArray = _covary.denoise(image, albedo, normal, fspath(oidn))
     return denoised

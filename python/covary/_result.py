@@ -56,7 +56,8 @@ class Result:
     predicted_bounds: bounds between which the relMSE lies in 80 of 100 renders; None if they are not known, or cannot
         be given.
     prediction_doubt: why the prediction is not reliable, such as bounds farther than a factor of 1.5 from it, few
-        samples, or few pixels that hold most of the error; "" if it is.
+        samples, or few pixels that hold most of the error; why there is none, of images that were to have one; "" if it
+        is reliable.
     warnings: warnings of the checks of the inputs, or of the render.
     nonfinite_pixels: pixels with a value that is not finite in an input; they have the mean of their finite groups.
     estimator: name and options of the estimator, as in `covary:estimator` of files.

@@ -146,11 +146,11 @@ nb::object array_of(Image&& image) {
   return array_of(std::move(image.data), shape, {});
 }
 
-void add_prediction(const std::optional<PredictedError>& predicted, nb::dict& to) {
+void add_prediction(const std::optional<PredictedError>& predicted, const std::string& note, nb::dict& to) {
   nb::object relmse = nb::none(), bounds = nb::none();
   if (predicted) relmse = nb::float_(predicted->relmse);
   if (predicted && predicted->bounds) bounds = nb::make_tuple(predicted->bounds->low, predicted->bounds->high);
-  const std::string doubt = predicted ? predicted->doubt : "";
+  const std::string doubt = predicted ? predicted->doubt : note;
   to["predicted_relmse"] = relmse;
   to["predicted_bounds"] = bounds;
   to["prediction_doubt"] = nb::str(doubt.c_str());

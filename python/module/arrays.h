@@ -60,7 +60,8 @@ Image image_of(nb::handle array, const std::string& name, const std::string& sha
 /// The image's memory as an array [H, W, channels], or [H, W] with one channel; None if the image is empty.
 nb::object array_of(Image&& image);
 /// Adds "predicted_relmse" and "predicted_bounds" (low, high), both None if not known, and "prediction_doubt".
-void add_prediction(const std::optional<PredictedError>& predicted, nb::dict& to);
+/// `note`: of the image, which says why there is no prediction.
+void add_prediction(const std::optional<PredictedError>& predicted, const std::string& note, nb::dict& to);
 /// Adds "bias_share" and "risks" of a denoised image, None and an empty dict if it is none.
 void add_risks(const EstimatorResult& image, nb::dict& to);
 /// [T, H, W, 3] of values in the order [H, W, T, 3].

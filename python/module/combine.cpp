@@ -272,7 +272,7 @@ nb::dict combine(nb::object crn, nb::object independent, const ExtraInputs& besi
   d["image"] = array_of(std::move(combined.image.estimate));
   d["std_error"] = array_of(std::move(combined.image.std_error));
   d["bias"] = array_of(std::move(combined.image.bias));
-  add_prediction(combined.predicted, d);
+  add_prediction(combined.predicted, combined.image.note, d);
   nb::dict layers;
   for (auto& [name, layer] : combined.layers) layers[name.c_str()] = array_of(std::move(layer));
   d["aovs"] = layers;

@@ -2,8 +2,8 @@
 // What covary.distributed needs from lab/: where scenes are, how many parts there are, and how to run the program.
 #include <filesystem>
 
+#include "core/process.h"
 #include "lab/plan.h"
-#include "lab/process.h"
 #include "python/module/bindings.h"
 #include "python/module/work.h"
 
@@ -25,8 +25,8 @@ std::vector<size_t> numbers_of_parts(const std::string& text) {
 
 /// Exit code, standard output and standard error of a program, which ends with this process at the latest.
 nb::tuple run_program(const std::vector<std::string>& command) {
-  lab::ProcessResult result;
-  run_work([&](WorkState& state) { result = lab::run_process(command, &state.stop); }, nb::none());
+  ProcessResult result;
+  run_work([&](WorkState& state) { result = run_process(command, &state.stop); }, nb::none());
   const auto text = [](const std::string& s) {
     return nb::steal<nb::object>(PyUnicode_DecodeUTF8(s.data(), static_cast<Py_ssize_t>(s.size()), "replace"));
   };

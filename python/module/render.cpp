@@ -114,7 +114,7 @@ nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std:
   d["image"] = array_of(std::move(picture));
   d["std_error"] = array_of(std::move(result.image.std_error));
   d["bias"] = array_of(std::move(result.image.bias));
-  add_prediction(result.predicted, d);
+  add_prediction(result.predicted, result.image.note, d);
   d["predicted_relmse_p95"] = result.predicted ? nb::cast(result.predicted_blocks) : nb::none();
   d["nonfinite_pixels"] = result.image.nonfinite_pixels;
   d["warnings"] = warnings;

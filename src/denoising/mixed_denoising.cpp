@@ -126,8 +126,11 @@ MixedDenoising single_candidate(const GroupedImage& independent, const std::vect
   out.result.std_error = Image();
   for (size_t i = 0; i < parts.valid.size(); ++i)
     if (parts.valid[i]) std::copy_n(&set.candidates[best].data[3 * i], 3, &out.result.estimate.data[3 * i]);
-  out.result.note = fmt::format("{}: the picture is the candidate '{}', and its error is unknown",
-                                why_unknown(independent), out.names[best]);
+  const std::string why = why_unknown(independent);
+  out.result.note =
+      independent.groups < 2 && !has_network(makers)
+          ? why + "; filters, which go by the noise between groups, leave the picture as it is"
+          : fmt::format("{}: the picture is the candidate '{}', and its error is unknown", why, out.names[best]);
   out.weights.assign(set.candidates.size(), Image(independent.width, independent.height, 1));
   std::fill(out.weights[best].data.begin(), out.weights[best].data.end(), 1.0f);
   out.candidates = std::move(set.candidates);

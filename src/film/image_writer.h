@@ -26,9 +26,9 @@ std::string lower_extension(const std::string& path);
 ///   .hdr               8 bits per channel and a shared exponent, on black; negative values and NaN become 0
 ///   .png               8-bit sRGB, values clamped to [0, 1], NaN becomes black; colours are divided by alpha first
 ///   .jpg .jpeg         the same on black, without alpha
-/// Throws Error(kIo).
-void write_image(const std::string& path, const Image& linear, const ImagePlace& place,
-                 const std::map<std::string, std::string>& attributes, const Image& alpha = {});
+/// Without a place, the image is the frame. Throws Error(kIo).
+void write_image(const std::string& path, const Image& linear, const ImagePlace& place = {},
+                 const std::map<std::string, std::string>& attributes = {}, const Image& alpha = {});
 
 /// The pixels of the frame of an image with any number of channels: 0 where the image has none.
 Image framed(const Image& image, const ImagePlace& place);

@@ -84,6 +84,17 @@ bool is_made_by(const std::string& path, const std::string& command) {
   }
 }
 
+bool is_made_by_covary(const std::string& path) {
+  std::error_code ignored;
+  if (fs::is_regular_file(path, ignored) && fs::file_size(path, ignored) == 0) return true;
+  try {
+    const std::map<std::string, std::string> attributes = inspect_image(path, ChecksumPolicy::kIgnore).attributes;
+    return std::ranges::any_of(attributes, [](const auto& entry) { return entry.first.starts_with("covary:"); });
+  } catch (const Error&) {
+    return false;  // damaged, or something else under this name
+  }
+}
+
 bool Outputs::identify(const std::string& path, Identity& identity) {
   struct stat status {};
   if (stat(path.c_str(), &status) == 0) {

@@ -387,6 +387,11 @@ TEST_F(LoadScene, ReportsFilesThatCannotBeRead) {
   std::filesystem::create_directory(folder_.file("sub"));
   EXPECT_TRUE(contains(errors(kSensor + "<shape type=\"ply\"><string name=\"filename\" value=\"sub\"/></shape>"),
                        "'sub' is a folder; expected a regular file"));
+  write("tri.obj", "v 0 0 0\nf 1 1 1\n");
+  EXPECT_EQ(message_of([&] { load_scene(folder_.file("tri.obj")); }),
+            folder_.file("tri.obj") +
+                ": not a scene that covary reads, which are Mitsuba XML, pbrt or glTF (.xml, .pbrt, "
+                ".glb, .gltf); export it as one of them, e.g. as .glb");
   write("empty.xml", "");
   EXPECT_TRUE(contains(message_of([&] { load_scene(folder_.file("empty.xml")); }), "empty.xml:1:1: malformed XML: "));
 }

@@ -63,7 +63,22 @@ std::string scene_file_endings() {
   return fmt::format("{}", fmt::join(endings, ", "));
 }
 
+namespace {
+
+/// Of a file that is no scene of covary by its name, and no XML by its text.
+void refuse_other_format(const SceneText& text) {
+  const size_t start = text.text.find_first_not_of("\xef\xbb\xbf \t\r\n");
+  if (is_scene_file(text.name) || (start != std::string_view::npos && text.text[start] == '<')) return;
+  throw Error(
+      ErrorCode::kInput,
+      fmt::format("{}: not a scene that covary reads, which are {} ({}); export it as one of them, e.g. as .glb",
+                  text.name, scene_format_names(), scene_file_endings()));
+}
+
+}  // namespace
+
 SceneXml read_scene_file(const SceneText& text, FileResolver& files, Diagnostics& diagnostics) {
+  refuse_other_format(text);
   const SceneFormat& format = scene_format_of(text.name);
   if (!format.has_defines && !text.defines.empty())
     throw Error(ErrorCode::kUsage,

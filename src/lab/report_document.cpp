@@ -218,10 +218,18 @@ std::string factor_text(double value) {
   return fmt::format("{:.0f}", std::round(value / unit) * unit);
 }
 
+/// Of a method that took much longer than its budget of time.
+std::string overrun_text(const Results& results, size_t budget, size_t method) {
+  double most = 0;
+  for (const Cell& cell : results.cells)
+    if (cell.budget == budget && cell.method == method) most = std::max(most, cell.time_ratio);
+  return most > 1.25 ? fmt::format(" But it took up to {:.2g} times that long.", most) : "";
+}
+
 /// "At equal samples (192 spp) balanced has the lowest error: 8.1 times lower than pt (7.0 to 9.4). Not clearly worse:
 /// error." Empty if nothing is significantly better than the baseline.
 std::string verdict(const Results& results, size_t budget, const std::string& condition, Estimate Summary::*ratio) {
-  constexpr double kClearly = 1.2;  // without an interval
+  constexpr double kClearly = 1.2, kMuchLess = 0.5;  // without an interval; of the largest factor
   const Suite& suite = results.suite;
   const Summary* best = nullptr;
   const std::vector<const Summary*> all = comparable(results, budget);
@@ -246,10 +254,13 @@ std::string verdict(const Results& results, size_t budget, const std::string& co
                                  suite.methods[best->method].name, factor_text(gain.value), suite.baseline);
   text += fmt::format(" {}.", range);
   if (!is_known) return text;
-  std::vector<std::string> as_good;
+  std::vector<std::string> as_good, untold;  // by their intervals, which may be wide
   for (const Summary* s : all)
-    if (s != best && (s->*ratio).high >= gain.low) as_good.push_back(suite.methods[s->method].name);
-  return as_good.empty() ? text : text + fmt::format(" Not clearly worse: '{}'.", fmt::join(as_good, "', '"));
+    if (s != best && (s->*ratio).high >= gain.low)
+      ((s->*ratio).value < kMuchLess * gain.value ? untold : as_good).push_back(suite.methods[s->method].name);
+  if (!as_good.empty()) text += fmt::format(" Not clearly worse: '{}'.", fmt::join(as_good, "', '"));
+  if (!untold.empty()) text += fmt::format(" Too few seeds to tell: '{}'.", fmt::join(untold, "', '"));
+  return text + overrun_text(results, budget, best->method);
 }
 
 /// The standard error of the difference of two methods' FLIP, over scenes; NaN with a single seed.
@@ -285,8 +296,13 @@ std::string flip_verdict(const Results& results, size_t budget) {
 }  // namespace
 
 std::vector<std::string> verdicts(const Results& results, size_t budget) {
-  const Budget& of = results.suite.budgets[budget];
+  const std::vector<Budget>& budgets = results.suite.budgets;
+  const Budget& of = budgets[budget];
   std::vector<std::string> all;
+  for (size_t b = budgets.size(); b-- > 0 && of.spp == 0 && all.empty();)
+    if (budgets[b].spp > 0)
+      all.push_back(
+          verdict(results, b, fmt::format("At equal samples ({})", budgets[b].label()), &Summary::equal_sample));
   if (of.spp > 0)
     all.push_back(verdict(results, budget, fmt::format("At equal samples ({})", of.label()), &Summary::equal_sample));
   all.push_back(verdict(results, budget,

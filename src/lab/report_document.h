@@ -23,8 +23,9 @@ void add_pictures(const Results& results, nlohmann::ordered_json& document, std:
 /// equal samples, or at equal time if the budget is in seconds). Empty if there is none.
 std::string best_method(const Results& results, size_t budget);
 
-/// A budget's conclusions in sentences: which method has the least error at equal samples, at equal time and by FLIP,
-/// and which are not clearly worse. Only counts methods that have every scene.
+/// A budget's conclusions in sentences: which method has the least error at equal samples (of a budget of time: at the
+/// last budget of samples, if there is one), at equal time and by FLIP, and which are not clearly worse. Only counts
+/// methods that have every scene.
 std::vector<std::string> verdicts(const Results& results, size_t budget);
 
 /// Index of the budget that pictures and single tables show: the suite's `show`, or the last.

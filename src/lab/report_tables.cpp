@@ -92,9 +92,13 @@ Json error_series(const Results& results, size_t scene, X&& x, Use&& use) {
               {"low", Json::array()},
               {"high", Json::array()},
               {"style", "line"}};
+    std::vector<const Cell*> cells;
     for (size_t b = 0; b < results.suite.budgets.size(); ++b) {
       const Cell* cell = results.find(scene, m, b);
-      if (!cell || !use(results.suite.budgets[b]) || !(cell->split.relative.error.value > 0)) continue;
+      if (cell && use(results.suite.budgets[b]) && cell->split.relative.error.value > 0) cells.push_back(cell);
+    }
+    std::ranges::stable_sort(cells, {}, [&](const Cell* cell) { return x(*cell); });
+    for (const Cell* cell : cells) {
       const Estimate& error = cell->split.relative.error;
       line["x"].push_back(x(*cell));
       line["y"].push_back(error.value);
@@ -115,10 +119,6 @@ std::string alternative(const std::string& start, const Json& series) {
                         line["y"].back().get<double>());
   return text;
 }
-
-}  // namespace
-
-namespace {
 
 /// "door, house".
 std::string names_of(const Results& results, const std::vector<size_t>& scenes) {

@@ -18,9 +18,9 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/process.h"
 #include "core/shell_text.h"
 #include "imageio/output_file.h"
-#include "lab/process.h"
 
 namespace covary::lab {
 namespace {

@@ -17,8 +17,8 @@
 #include <string>
 #include <vector>
 
+#include "core/process.h"
 #include "lab/plan.h"
-#include "lab/process.h"
 
 namespace covary::lab {
 

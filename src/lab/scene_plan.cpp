@@ -3,8 +3,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/process.h"
 #include "core/shell_text.h"
-#include "lab/process.h"
 
 namespace covary::lab {
 

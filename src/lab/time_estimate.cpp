@@ -8,7 +8,7 @@
 #include <set>
 #include <thread>
 
-#include "lab/process.h"
+#include "core/process.h"
 #include "lab/runner.h"
 
 namespace covary::lab {

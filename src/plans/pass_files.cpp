@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "core/json_depth.h"
 #include "film/film_file.h"
+#include "film/outputs.h"
 #include "film/splat_layer.h"
 #include "imageio/output_file.h"
 #include "imageio/output_folder.h"
@@ -166,6 +167,11 @@ bool asks_for_more(const RenderRequest& request, const MadeFile& picture) {
 
 void check_earlier_films(const Plan& plan, const RenderRequest& request) {
   if (request.output.empty() || request.overwrite) return;
+  std::error_code ignored;
+  if (fs::is_regular_file(request.output, ignored) && !is_made_by_covary(request.output))
+    throw Error(ErrorCode::kInput, fmt::format("'{}' already exists, and covary did not make it; give another name, or "
+                                               "`overwrite` to replace it",
+                                               request.output));
   const bool is_film = outputs_film(plan, request);
   // With a folder for films, the output is a copy of one.
   const bool continues = request.resume && (is_film ? is_film_file(request.output) : !request.passes.empty());
@@ -175,7 +181,6 @@ void check_earlier_films(const Plan& plan, const RenderRequest& request) {
                             request.resume ? "only the command that started it can continue it; `overwrite` "
                                              "replaces it"
                                            : "`resume` continues it, and `overwrite` replaces it"));
-  std::error_code ignored;
   const bool has_folder = !is_film && !request.resume && request.passes.empty();
   const std::string unfinished = film_in(passes_folder(request));
   if (has_folder && !unfinished.empty())

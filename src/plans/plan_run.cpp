@@ -68,6 +68,7 @@ RenderResult PlanRun::run() {
       keep_films_before_more();
       estimate();
     }
+    for (Pass& pass : state_.passes) pass.film.attributes[film_key::kComplete] = result_.interrupted ? "false" : "true";
     const Stopwatch watch;
     const double before = processor_seconds();
     write_files();

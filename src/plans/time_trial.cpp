@@ -158,8 +158,10 @@ void PlanRun::plan_time_limit() {
         costs_.auxiliary > 0 ? fmt::format("{:.2g} for auxiliary images, ", plan.aov_samples * costs_.auxiliary) : "",
         plan.samples * costs_.sample, counted(plan.samples, "sample"), between + costs_.end));
   if (needs_aovs()) aov_samples_ = plan.aov_samples;
-  // No more groups are begun than can be filled if the trials were wrong by a factor of two; an error needs groups.
-  const uint32_t fewest = request_.until > 0 ? state_.budget : 1;
+  // No more groups are begun than can be filled if the trials were wrong by a factor of two; but an error, and filters,
+  // need some.
+  constexpr uint32_t kUseful = 4;
+  const uint32_t fewest = request_.until > 0 ? state_.budget : std::min(plan.samples, kUseful);
   if (in_rounds() || plan_.groups_follow_speed)
     state_.group_budget = std::max(fewest, std::min(limit, plan.samples / 2));
   if (in_rounds())

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """combine(), metrics, images and films: the values and messages of the command line."""
+import contextlib
 import inspect
 import json
 import subprocess
@@ -193,6 +194,16 @@ class Images(PackageTest):
         self.assertIn("image: found", self.message_of(TypeError, covary.write_image, "x.exr", [1]))
         self.assertIn("/nowhere/x.exr", self.message_of(covary.IoError, covary.write_image, "/nowhere/x.exr",
                                                         noisy(6, False)[0]))
+
+    def test_features_that_are_none(self):
+        """Another render in place of the albedo, as after `covary denoise a.exr b.exr`, is told."""
+        image = noisy(6, False)[0]
+        for call in (lambda: covary.combine(None, noisy(7, True), oidn="off", albedo=image + 1, force=True),
+                     lambda: covary.denoise(image, image + 1, oidn="/nowhere")):
+            with self.assertWarnsRegex(covary.CovaryWarning, r"albedo: \d+% of its values are far from between 0 and 1"
+                                                             r".*combine\(None, \[first, second\]\)"):
+                with contextlib.suppress(covary.UsageError):  # of the missing denoiser
+                    call()
 
     def test_denoiser_that_is_missing(self):
         message = self.message_of(covary.UsageError, covary.denoise, noisy(6, False)[0], oidn="/nowhere")

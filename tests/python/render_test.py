@@ -123,6 +123,17 @@ class Render(PackageTest):
                 with ThreadPoolExecutor(4) as threads:
                     self.assertEqual(list(threads.map(bits, range(4))), alone, integrator)
 
+    def test_why_there_is_no_prediction(self):
+        few = covary.render("room", 3, resolution=(24, 16), oidn="off")
+        self.assertIsNone(few.predicted_relmse)
+        self.assertIn("fewer than 4 samples per pixel", few.prediction_doubt)
+        film = covary.render("room", 8, "none", resolution=(24, 16)).films["independent"]
+        self.assertEqual(film.attributes["complete"], "true")
+        self.assertIn("in one group", covary.combine(None, film, oidn="off").prediction_doubt)
+        self.assertIn("history has no effect with fewer than 4 samples",
+                      self.message_of(covary.UsageError, covary.render_frames, "room", self.path / "h_#.exr", "1-2",
+                                      spp=3, history=True))
+
     def test_frames_that_were_interrupted_are_not_complete(self):
         """They do not count for progress."""
         image, file = numpy.zeros((4, 4, 3), numpy.float32), str(self.path / "f.exr")

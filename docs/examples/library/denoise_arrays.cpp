@@ -49,9 +49,11 @@ int main(int argc, char** argv) try {
   covary::CombinedImage combined = covary::combine(request);
 
   if (!combined.image.note.empty()) std::printf("%s\n", combined.image.note.c_str());
-  if (const auto& error = combined.predicted)  // `doubt`: why it may be wrong
-    std::printf("predicted relMSE %.3g%s%s\n", error->relmse, error->doubt.empty() ? "" : ", but ",
-                error->doubt.c_str());
+  if (const auto& error = combined.predicted) {
+    std::printf("predicted relMSE %.3g", error->relmse);
+    if (error->bounds) std::printf(" (80 %%: %.3g to %.3g)", error->bounds->low, error->bounds->high);
+    std::printf("%s%s\n", error->doubt.empty() ? "" : ", but ", error->doubt.c_str());  // why it may be wrong
+  }
   covary::write_result(argv[3], request.independent.origin.place, {}, combined.image, combined.layers);
   return 0;  // the picture is combined.image.estimate, its standard error combined.image.std_error
 } catch (const std::exception& error) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/process.h"
+#include "core/process.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -19,7 +19,7 @@
 #include "core/processor_time.h"
 #include "core/stopwatch.h"
 
-namespace covary::lab {
+namespace covary {
 namespace {
 
 constexpr size_t kErrorsKept = 65536;
@@ -152,4 +152,4 @@ std::string complaint(const std::string& errors) {
   return line.starts_with(name) ? line.substr(name.size()) : line;
 }
 
-}  // namespace covary::lab
+}  // namespace covary

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace covary::lab {
+namespace covary {
 
 struct ProcessResult {
   int exit_code = 0;  ///< 128 + signal for a program ended by a signal
@@ -32,4 +32,4 @@ std::string telling_line(const std::string& errors);
 /// The same without covary's name in front.
 std::string complaint(const std::string& errors);
 
-}  // namespace covary::lab
+}  // namespace covary

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Child processes: their output, their exit, and what happens to them when this process is told to stop.
-#include "lab/process.h"
+#include "core/process.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 
 #include "support/files.h"
 
-namespace covary::lab {
+namespace covary {
 namespace {
 
 using test_support::contains;
@@ -106,4 +106,4 @@ TEST(Process, ChildrenCanBeInterruptedThoughTheParentIgnoresIt) {
 }
 
 }  // namespace
-}  // namespace covary::lab
+}  // namespace covary
