@@ -6,39 +6,24 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <utility>
 
-#include "combine/beauty_layers.h"
-#include "combine/combine.h"
 #include "combine/combine_settings.h"
 #include "combine/registry.h"
 #include "combine/result_file.h"
 #include "commands.h"
 #include "core/error.h"
-#include "core/memory_limit.h"
 #include "core/printable.h"
-#include "core/stopwatch.h"
 #include "declared_options.h"
+#include "denoised_pictures.h"
 #include "denoising/mixed_denoising.h"
-#include "feature_layers.h"
-#include "film/denoised_by.h"
-#include "film/exr_copy.h"
-#include "film/image_rows.h"
 #include "film/outputs.h"
-#include "film/pictures.h"
-#include "film/written_by.h"
-#include "filters/stray_values.h"
 #include "frame_files.h"
 #include "json_output.h"
-#include "metrics/provenance.h"
-#include "network_memory.h"
 #include "numbers.h"
 #include "picture_options.h"
 #include "progress.h"
@@ -54,202 +39,14 @@ namespace {
 /// --mode: Open Image Denoise alone, or the objective of a mixture.
 constexpr const char* kNetwork = "oidn";
 
-struct Options {
-  std::vector<std::string> inputs;
-  std::string output, mode, oidn, albedo, normal, json;
-  PictureChoice choice;
-  std::vector<std::string> layers;
-  bool no_features = false, clean_features = false, check = false, force = false, overwrite = false;
-  bool quiet = false, verbose = false;
-  FrameOptions of_frames;
-  std::optional<double> memory_mib;
-  std::shared_ptr<const History> history;  ///< of the frame being denoised
-  DenoiseOptions denoiser() const { return {oidn}; }
-  DenoisingChoice mixing() const {
-    return {mode.empty() ? default_denoising(kDefaultEstimator) : mode, oidn, {history}};
-  }
-};
-
 /// --check: prints which library is used.
-void check(const Options& o) {
+void check(const DenoiseCommand& o) {
   const DenoiserInfo info = denoiser_info(o.denoiser());
   fmt::print("Open Image Denoise {}\n{}\n", info.version, info.path);
 }
 
-void warn_of_values(const std::string& path, const Image& image) {
-  std::vector<StrayValue> replaced;
-  with_usable_values(image, &replaced);
-  if (replaced.empty()) return;
-  fmt::print(stderr,
-             "warning: {}: {} of {} pixels hold values that are NaN, infinite, overflow or outshine the whole picture "
-             "{:.0f} times, the first at ({}, {}); the pixels around replace them\n",
-             path, replaced.size(), image.data.size() / 3, kMaxOfPicture, replaced[0].x, replaced[0].y);
-}
-
-/// One picture of the inputs: what is denoised, and where the result goes.
-struct Task {
-  Picture picture;    ///< what the result replaces
-  std::string layer;  ///< what is denoised: the picture, or the render before Cycles denoised it
-  bool is_only = true;
-  std::string text() const {
-    return is_only ? "" : fmt::format(" ({})", picture.layer.empty() ? "R G B" : picture.layer);
-  }
-  std::string prefix() const { return is_only || picture.layer.empty() ? "" : picture.layer + "."; }
-};
-
-/// A denoised picture, and what to say about it.
-struct Denoised {
-  ResultPicture result;
-  std::map<std::string, std::string> attributes;
-  std::optional<PredictedError> predicted;
-  nlohmann::ordered_json json;
-  std::function<void()> report;
-};
-
-/// What is denoised: the picture of each view and view layer, if none is named.
-std::vector<Task> tasks_of(const Options& o) {
-  const std::vector<ExrFile::Channel> channels = inspect_image(o.inputs[0]).channels;
-  std::vector<Picture> pictures = find_pictures(channels);
-  if (!o.choice.layer.empty() || !o.choice.view.empty() || pictures.empty())
-    pictures = is_unnamed(o.choice) ? std::vector<Picture>(1) : chosen_pictures(o.inputs[0], channels, o.choice);
-  std::vector<Task> tasks;
-  for (const Picture& picture : pictures) {
-    const std::string noisy = picture.layer == o.choice.layer ? "" : noisy_layer(picture, channels);
-    if (!noisy.empty())
-      fmt::print(stderr, "note: {}: '{}' is denoised already; '{}' beside it, which is not, is denoised instead\n",
-                 printable(o.inputs[0]), picture.layer, noisy);
-    tasks.push_back({picture, noisy.empty() ? picture.layer : noisy, pictures.size() == 1});
-  }
-  return tasks;
-}
-
-std::map<std::string, std::string> new_attributes(const Options& o) {
-  std::map<std::string, std::string> attributes = inherited_attributes(o.inputs);
-  attributes["covary:version"] = COVARY_VERSION;
-  attributes["covary:command"] = command_line();
-  return attributes;
-}
-
-/// Alpha as an image; empty if it is 0 or 1 everywhere, with nothing to denoise.
-Image partial_alpha(const std::string& path, const std::string& channel) {
-  Image alpha = read_image(path, channel, ChecksumPolicy::kCheck, std::nullopt).image;
-  const bool partial = std::any_of(alpha.data.begin(), alpha.data.end(), [](float a) { return a > 0 && a < 1; });
-  return partial ? alpha : Image();
-}
-
-Image as_alpha(const Image& grey) {
-  Image alpha(grey.width, grey.height, 1);
-  for (size_t i = 0; i < alpha.data.size(); ++i) alpha.data[i] = std::clamp(grey.data[3 * i], 0.0f, 1.0f);
-  return alpha;
-}
-
-Denoised denoise_by_network(const Options& o, const Task& task, ProgressLine& progress) {
-  const Stopwatch watch;
-  const std::string& input = o.inputs[0];
-  if (!DenoisingChoice{"auto", o.oidn, {}}.uses_oidn())
-    usage("'" + input +
-          "' is one image, which only Open Image Denoise denoises: leave out --oidn off, or give a "
-          "second render of another seed, too");
-  const ImageInfo info = inspect_image(input);
-  require_memory_of_network(input, info.place.window, o.memory_mib);
-  const ColourSpace colours = ImageRows(input, task.layer).colours();
-  FeatureLayers features({o.inputs, task.picture, colours, o.albedo, o.normal, o.no_features});
-  const PlacedImage image = read_image(input, task.layer, ChecksumPolicy::kCheck, std::nullopt);
-  warn_of_values(input, image.image);
-  if (const std::string by = denoised_by(info.attributes, info.channels, task.layer); !by.empty())
-    fmt::print(stderr, "warning: {} is denoised already ({}); give the render before denoising ({})\n", input, by,
-               where_to_set(RenderSetting::kNoDenoiser, written_by(info.attributes)));
-  progress.begin("denoising");
-  Denoiser denoiser(o.denoiser());
-  const std::string guided = features.text();
-  const auto taken = [&](const char* name, std::optional<Image>& feature) -> std::shared_ptr<const Image> {
-    if (!feature) return nullptr;
-    Image own = *std::exchange(feature, std::nullopt);
-    return std::make_shared<const Image>(o.clean_features ? denoiser.denoise_feature(name, own) : std::move(own));
-  };
-  const std::shared_ptr<const Image> albedo = taken("albedo", features.albedo),
-                                     normal = taken("normal", features.normal);
-  const auto denoised = [&](const Image& noisy) { return denoiser.denoise(noisy, albedo, normal, o.clean_features); };
-  Denoised result;
-  const std::vector<std::string> picture = layer_channels(input, info.channels, task.picture.layer);
-  result.result.image.estimate = denoised(image.image);
-  result.result.source = {o.inputs, {picture[0], picture[1], picture[2]}, {}, task.prefix()};
-  const std::string alpha = is_exr_image(input) ? alpha_channel(info.channels, picture[0]) : "";
-  if (Image values = alpha.empty() ? Image() : partial_alpha(input, alpha); !values.data.empty())
-    result.result.aovs[alpha] = as_alpha(denoised(values));
-  result.attributes = new_attributes(o);
-  result.attributes["covary:denoiser"] = "Open Image Denoise " + denoiser_info(o.denoiser()).version;
-  result.report = [=, width = image.image.width, height = image.image.height, seconds = watch.seconds()] {
-    fmt::print(stderr, "{}{}: {} x {}, {}, in {:.2f} s\n{}", o.output, task.text(), width, height, guided, seconds,
-               kErrorOfOneRender);
-  };
-  return result;
-}
-
-nlohmann::ordered_json statistics(const Options& o, const CombineRequest& request, const CombinedImage& combined,
-                                  const DenoisingChoice& choice) {
-  nlohmann::ordered_json json{
-      {"output", o.output},
-      {"estimator", request.estimator.text},
-      {"width", request.independent.width},
-      {"height", request.independent.height},
-      {"independent_groups", request.independent.groups},
-      {"nonfinite_pixels", combined.image.nonfinite_pixels},
-      {"planned_memory_bytes", combined.planned_memory},
-      {"peak_memory_bytes", peak_memory_bytes()},
-      {"seconds", {{"read_and_check", combined.check_seconds}, {"estimate", combined.estimate_seconds}}}};
-  if (combined.predicted) add_prediction(*combined.predicted, json);
-  add_risks(combined.image.risks, json);
-  add_network(request.estimator.network, combined.image.network_runs, choice, json);
-  if (!combined.image.note.empty()) json["note"] = combined.image.note;
-  return json;
-}
-
-Denoised denoise_by_mixture(const Options& o, const Task& task, const GroupedFile& file, ProgressLine& progress) {
-  CombineRequest request;
-  request.independent = source_of(file);
-  const DenoisingChoice choice = o.mixing();
-  request.estimator = make_default_estimator(false, {}, choice);
-  request.settings.std_error = true;
-  const FeatureLayers features({o.inputs, task.picture, file.colours(), o.albedo, o.normal, o.no_features});
-  request.settings.features = features.view();
-  const BeautyLayers layers(o.inputs, task.picture, o.layers, true);
-  request.layers = layers.sources();
-  request.force = o.force;
-  limit_memory(request, o.memory_mib);
-  request.checked = [&](const InputFindings& found) {
-    progress.clear();
-    print_findings(found.findings, "denoises", o.force, o.quiet);
-    progress.begin("denoising");
-  };
-  CombinedImage combined = combine(request);
-  layers.finish(combined.layers);
-  Denoised result;
-  result.json = statistics(o, request, combined, choice);
-  if (!task.is_only) result.json["picture"] = task.picture.layer;
-  result.result.source = file.source();
-  if (!task.picture.channels[0].empty()) result.result.source.picture = task.picture.channels;
-  result.result.source.prefix = task.prefix();
-  result.attributes = new_attributes(o);
-  if (o.history) result.attributes[kHistoryAttribute] = o.history->of;
-  result.attributes["covary:estimator"] = request.estimator.text;
-  if (!request.estimator.network.empty()) result.attributes["covary:denoiser"] = request.estimator.network;
-  if (file.samples() > 0) result.attributes["covary:samples"] = fmt::to_string(file.samples());
-  result.predicted = combined.predicted;
-  const std::string note = combined.image.note, lines = error_lines(combined, o.verbose);
-  result.result.image = std::move(combined.image), result.result.aovs = std::move(combined.layers);
-  const std::string what = fmt::format("{}{}: {} x {}, {} of {}, {}, in {:.2f} s", o.output, task.text(), file.width(),
-                                       file.height(), request.estimator.text, file.groups_text(), features.text(),
-                                       combined.check_seconds + combined.estimate_seconds);
-  result.report = [what, note, lines, choice] {
-    print_notes(choice, note);
-    fmt::print(stderr, "{}\n{}", what, lines);
-  };
-  return result;
-}
-
 /// Writes the results in place of the pictures of the first input.
-void write(const Options& o, const ImagePlace& place, std::vector<Denoised>& all, ProgressLine& progress) {
+void write(const DenoiseCommand& o, const ImagePlace& place, std::vector<Denoised>& all, ProgressLine& progress) {
   progress.begin("writing");
   std::vector<ResultPicture> pictures;
   for (Denoised& one : all) pictures.push_back(std::move(one.result));
@@ -267,9 +64,9 @@ void write(const Options& o, const ImagePlace& place, std::vector<Denoised>& all
 }
 
 /// Whether the options select the network alone, whatever the image.
-bool is_by_network(const Options& o) { return o.mode == kNetwork || (o.mode.empty() && o.clean_features); }
+bool is_by_network(const DenoiseCommand& o) { return o.mode == kNetwork || (o.mode.empty() && o.clean_features); }
 
-void check_options(const Options& o) {
+void check_options(const DenoiseCommand& o) {
   if (o.inputs.empty() || o.output.empty()) usage("expected IN.exr and -o OUT.exr, or --check");
   if (o.no_features && !(o.albedo + o.normal).empty()) usage("--albedo and --normal have no effect with --no-features");
   if (o.no_features && o.clean_features) usage("--clean-features has no effect with --no-features");
@@ -280,12 +77,23 @@ void check_options(const Options& o) {
                           o.inputs[i]));
   if (o.inputs.size() > 1 && is_by_network(o))
     usage("--mode oidn and --clean-features are for one image; covary merge makes one of films");
+  if (o.target && is_by_network(o))
+    usage("--device runs mixtures of denoised images, not Open Image Denoise alone, which has devices of its own");
   if (o.clean_features && !is_by_network(o))
     usage("--clean-features is an option of --mode oidn; mixtures always denoise their auxiliary features first");
 }
 
+/// The samples; null if the network takes the image alone. The next frame's are read from then on.
+std::shared_ptr<const FrameFile> frame_of(const DenoiseCommand& o, const DenoiseTask& task) {
+  if (is_by_network(o)) return nullptr;
+  if (!o.next_frame || !task.is_only) return std::make_shared<const FrameFile>(o.inputs, task.layer);
+  std::shared_ptr<const FrameFile> frame = o.next_frame->take(o.inputs, task.layer);
+  o.next_frame->begin(o.inputs_of_next, task.layer);
+  return frame;
+}
+
 /// Returns what to say about the result.
-std::string run_one(const Options& o) {
+std::string run_one(const DenoiseCommand& o) {
   check_options(o);
   Outputs outputs;
   outputs.reads(o.inputs);
@@ -295,11 +103,10 @@ std::string run_one(const Options& o) {
   progress.begin("loading");
   ImagePlace place;
   std::vector<Denoised> all;
-  for (const Task& task : tasks_of(o)) {
-    std::optional<GroupedFile> file;
-    if (!is_by_network(o)) file.emplace(o.inputs, task.layer);
-    const bool is_mixture = file && file->groups() > 1;
-    if (file && !is_mixture && !o.mode.empty())
+  for (const DenoiseTask& task : tasks_of(o)) {
+    const std::shared_ptr<const FrameFile> frame = frame_of(o, task);
+    const bool is_mixture = frame && frame->file().groups() > 1;
+    if (frame && !is_mixture && !o.mode.empty())
       throw Error(ErrorCode::kUsage, fmt::format("--mode {} needs a second render of another seed, or a film with two "
                                                  "groups or more (--groups); '{}' has one",
                                                  o.mode, o.inputs[0]));
@@ -307,8 +114,10 @@ std::string run_one(const Options& o) {
       throw Error(ErrorCode::kUsage, "--layers are denoised by a mixture, which needs a second render of another seed");
     if (!o.json.empty() && !is_mixture)
       throw Error(ErrorCode::kUsage, "--json tells the error, which needs a second render of another seed");
-    place = file ? file->place() : inspect_image(o.inputs[0]).place;
-    all.push_back(is_mixture ? denoise_by_mixture(o, task, *file, progress) : denoise_by_network(o, task, progress));
+    if (o.target && !is_mixture)
+      throw Error(ErrorCode::kUsage, "--device runs mixtures, which need a second render of another seed");
+    place = frame ? frame->file().place() : inspect_image(o.inputs[0]).place;
+    all.push_back(is_mixture ? denoise_by_mixture(o, task, *frame, progress) : denoise_by_network(o, task, progress));
   }
   write(o, place, all, progress);
   const std::optional<PredictedError>& error = all[0].predicted;
@@ -316,36 +125,47 @@ std::string run_one(const Options& o) {
          (error ? ", " + prediction_text(*error, std::nullopt) : "");
 }
 
-void run_sequence(const Options& o, const FramePatterns& patterns) {
+std::vector<std::string> inputs_of(const DenoiseCommand& o, int frame) {
+  std::vector<std::string> paths;
+  for (const std::string& path : o.inputs) paths.push_back(frame_name(path, frame));
+  return paths;
+}
+
+void run_sequence(const DenoiseCommand& o, const FramePatterns& patterns) {
   if (!o.json.empty() && o.json != "-" && !is_frame_pattern(o.json))
     throw Error(ErrorCode::kUsage, fmt::format("--json '{}': of frames, expected a name with '#', or -", o.json));
+  const auto next = std::make_shared<NextFrame>();
   for_each_frame(o.of_frames, patterns, !is_by_network(o), [&](int frame, std::shared_ptr<const History> history) {
-    Options one = o;
+    DenoiseCommand one = o;
     one.output = frame_name(o.output, frame);
     if (is_frame_pattern(o.json)) one.json = frame_name(o.json, frame);
-    for (std::string& path : one.inputs) path = frame_name(path, frame);
+    one.inputs = inputs_of(o, frame);
+    if (o.target && !o.of_frames.watch) one.next_frame = next, one.inputs_of_next = inputs_of(o, frame + 1);
     one.history = std::move(history);
     one.quiet = true;
     return run_one(one);
   });
 }
 
-void run_folders(const Options& o) {
+void run_folders(const DenoiseCommand& o) {
   if (!o.json.empty() && o.json != "-")
     throw Error(ErrorCode::kUsage, fmt::format("--json '{}': for images of a folder, expected -", o.json));
   for_each_image(o.of_frames, o.inputs, o.output,
                  [&](const std::vector<std::string>& paths, const std::string& result) {
-                   Options one = o;
+                   DenoiseCommand one = o;
                    one.inputs = paths, one.output = result, one.quiet = true;
                    return run_one(one);
                  });
 }
 
-void run(Options o) {
+void run(DenoiseCommand o) {
   o.of_frames.quiet = o.quiet;
   if (o.check) return check(o);
+  Settings values(o.values);
+  declare_device(values, o.device);
+  o.target = gpu::Target::open(o.device);
   if (are_folders(o.of_frames, o.inputs, o.output)) return run_folders(o);
-  const std::string made_by = is_by_network(o) ? "" : make_default_estimator(false, {}, o.mixing()).text;
+  const std::string made_by = is_by_network(o) ? "" : make_default_estimator(false, {}, o.mixing(), o.target).text;
   const FramePatterns patterns{o.inputs, {}, o.output, o.choice, made_by};
   if (are_frames(o.of_frames, patterns)) return run_sequence(o, patterns);
   run_one(o);
@@ -354,7 +174,7 @@ void run(Options o) {
 }  // namespace
 
 void add_denoise(CLI::App& app) {
-  const auto o = std::make_shared<Options>();
+  const auto o = std::make_shared<DenoiseCommand>();
   CLI::App* command = app.add_subcommand("denoise", "Denoise an image, or several renders of different seeds");
   add_value(*command, "IN", o->inputs, kFileValue,
             "Linear image (EXR), guided by its albedo and normal layers, whatever the renderer calls them. Several "
@@ -388,6 +208,9 @@ void add_denoise(CLI::App& app) {
       "--clean-features", o->clean_features,
       "With --mode oidn, denoise the auxiliary features first: less error if they are noisy, in three times the time");
   add_value(*command, "--json", o->json, kFileValue, "File for statistics of a mixture; '-': standard output");
+  Settings of_device;
+  declare_device(of_device, o->device);
+  add_options(*command, of_device.options(), o->values);
   command->add_option("--memory", o->memory_mib, kMemoryHelp)->check(positive_number());
   add_frame_options(*command, o->of_frames, "Denoise");
   add_overwrite_option(*command, o->overwrite);

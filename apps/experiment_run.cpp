@@ -14,6 +14,7 @@
 #include "commands.h"
 #include "core/content_hash.h"
 #include "core/error.h"
+#include "core/number_text.h"
 #include "core/stopwatch.h"
 #include "core/unfinished.h"
 #include "film/outputs.h"

@@ -11,7 +11,7 @@
 namespace covary {
 namespace {
 
-constexpr double kShownShare = 0.02, kShownSeconds = 0.1;  // at least, of phases that are named
+constexpr double kNamedShare = 0.02, kNamedSeconds = 0.1;  // at least, of phases that are named
 
 }  // namespace
 
@@ -37,7 +37,7 @@ std::string text_of(const PhaseTimes& times, const std::string& estimate) {
                                                    {"training", times.training}, {"auxiliary images", times.auxiliary},
                                                    {"samples", times.samples},   {estimate.c_str(), times.estimate},
                                                    {"writing", times.writing}};
-  const double least = std::max(kShownSeconds, kShownShare * times.total());
+  const double least = std::max(kNamedSeconds, kNamedShare * times.total());
   std::string text = seconds_text(times.total());
   const char* before = ": ";
   for (const auto& [name, seconds] : phases) {
