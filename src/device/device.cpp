@@ -28,7 +28,7 @@ RawBuffer::RawBuffer(std::shared_ptr<MemoryPool> pool, size_t bytes) : pool_(std
 }
 
 void RawBuffer::reset() noexcept {
-  if (handle_) pool_->give(handle_, at_least_one(bytes_));
+  if (handle_ && pool_) pool_->give(handle_, at_least_one(bytes_));
   pool_.reset();
   handle_ = 0;
   bytes_ = 0;

@@ -35,6 +35,8 @@ class RawBuffer {
  public:
   RawBuffer() = default;
   RawBuffer(std::shared_ptr<MemoryPool> pool, size_t bytes);
+  /// Memory of another owner, which stays its own.
+  RawBuffer(uint64_t handle, size_t bytes) : handle_(handle), bytes_(bytes) {}
   ~RawBuffer() { reset(); }
   RawBuffer(RawBuffer&& other) noexcept { swap(other); }
   RawBuffer& operator=(RawBuffer&& other) noexcept {
@@ -63,6 +65,7 @@ class Buffer : public RawBuffer {
  public:
   Buffer() = default;
   Buffer(std::shared_ptr<MemoryPool> pool, size_t size) : RawBuffer(std::move(pool), size * sizeof(T)) {}
+  Buffer(uint64_t handle, size_t size) : RawBuffer(handle, size * sizeof(T)) {}
   size_t size() const { return bytes() / sizeof(T); }
 };
 
@@ -114,6 +117,13 @@ class Device {
   template <typename T>
   Buffer<T> make(size_t size) {
     return Buffer<T>(pool_, size);
+  }
+  /// Memory that another program of this process has on the device, `size` elements: with CUDA a device pointer of the
+  /// primary context, as PyTorch and CuPy have them; with OpenCL a cl_mem of this device's context. It is not copied,
+  /// stays its owner's, and must outlive the buffer. What its owner does with it must be finished.
+  template <typename T>
+  Buffer<T> borrow(uint64_t handle, size_t size) {
+    return Buffer<T>(handle, size);
   }
   /// Copies to and from a buffer, from element `first` of it on. The source may be changed after write() has returned.
   template <typename T>

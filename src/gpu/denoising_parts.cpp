@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/error.h"
 #include "gpu/launch.h"
 
 namespace covary::gpu {
@@ -42,9 +43,14 @@ PartBuffers part_of(Device& device, const Groups& groups, const GroupSet& set) {
 }  // namespace
 
 Groups upload(Device& device, const GroupedImage& image) {
-  Groups result{image.width, image.height, image.groups, {}, {}, image.counts != nullptr, {}};
+  const size_t values = static_cast<size_t>(image.width) * image.height * image.groups * 3;
+  return groups_of(device, image, device.upload(std::span(image.data, values)));
+}
+
+Groups groups_of(Device& device, const GroupedImage& image, Buffer<float> samples) {
+  Groups result{image.width, image.height, image.groups, std::move(samples), {}, image.counts != nullptr, {}};
   const auto pixels = static_cast<size_t>(result.pixels());
-  result.data = device.upload(std::span(image.data, pixels * image.groups * 3));
+  COVARY_CHECK(result.data.size() == pixels * image.groups * 3, "as many samples as the image has");
   constexpr uint32_t kNone = 0;
   result.counts = device.upload(image.counts ? std::span(image.counts, pixels) : std::span(&kNone, 1));
   result.valid = device.make<unsigned char>(pixels);

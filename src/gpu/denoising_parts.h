@@ -26,6 +26,8 @@ struct Groups {
   int pixels() const { return width * height; }
 };
 Groups upload(Device& device, const GroupedImage& image);
+/// The same of samples that are on the device already, in the order of GroupedImage::data, which is not read.
+Groups groups_of(Device& device, const GroupedImage& image, Buffer<float> samples);
 
 /// Groups first, first + step, …
 struct GroupSet {

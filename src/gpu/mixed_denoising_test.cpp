@@ -289,6 +289,42 @@ TEST(GpuMixedDenoising, IsTheSameEveryTime) {
   EXPECT_EQ(first.std_error.data, second.std_error.data);
 }
 
+/// Counts what is copied to it.
+class CountingBackend final : public test_support::WrappedBackend {
+ public:
+  explicit CountingBackend(size_t& written) : written_(written) {}
+  void write(uint64_t buffer, size_t offset, const void* from, size_t bytes) override {
+    written_ += bytes;
+    WrappedBackend::write(buffer, offset, from, bytes);
+  }
+
+ private:
+  size_t& written_;
+};
+
+/// Those that another program made there: the same bits, without a copy, and they are left as they are.
+TEST(GpuMixedDenoising, ReadsSamplesOnTheDeviceInPlace) {
+  const Pictures p;
+  const test::Grouped image = test::noisy_image(kWidth, kHeight, 6, 30, 1);
+  size_t written = 0;
+  device::Device device(std::make_shared<CountingBackend>(written));
+  MeanMixture request{image.view(), {&p.albedo, &p.normal}, FilterKinds::kAll, {1, 1, false}, {}, true, false};
+  const MixedDenoising expected = mix_mean(device, request);
+  const size_t with_copy = std::exchange(written, 0);
+  const Buffer<float> owned = device.upload(std::span(image.data));
+  {
+    const Buffer<float> samples = device.borrow<float>(owned.handle(), owned.size());
+    request.independent.data = nullptr;
+    written = 0;
+    const MixedDenoising found = mix_mean(device, request, samples);
+    EXPECT_EQ(found.result.estimate.data, expected.result.estimate.data);
+    EXPECT_EQ(found.result.std_error.data, expected.result.std_error.data);
+  }
+  EXPECT_EQ(with_copy - written, image.data.size() * sizeof(float));
+  EXPECT_EQ(device.download(owned), image.data);
+  EXPECT_THROW(mix_mean(device, request, owned, {"", 20, {}}), device::Failure) << "not in bands";
+}
+
 TEST(GpuMixedDenoising, TellsItsStages) {
   const Pictures p;
   const test::Grouped image = test::noisy_image(kWidth, kHeight, 6, 26, 1);

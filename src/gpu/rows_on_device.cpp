@@ -17,7 +17,7 @@ namespace covary::gpu {
 double bytes_of_mean(int groups) { return 12.0 * groups + 700; }
 double largest_buffer_of_mean(int groups) { return 12.0 * std::max(groups, kMaxCandidates); }
 
-RowsOnDevice::RowsOnDevice(Device& device, const MeanMixture& request, const Trial& trial)
+RowsOnDevice::RowsOnDevice(Device& device, const MeanMixture& request, const Trial& trial, const Buffer<float>* samples)
     : device_(device),
       base_(CandidateBase::kMean),
       independent_(request.independent),
@@ -27,7 +27,8 @@ RowsOnDevice::RowsOnDevice(Device& device, const MeanMixture& request, const Tri
       std_error_(request.std_error || request.history.is_used()),
       stages_(device, trial) {
   stages_.run("copy samples and auxiliary images", [&] {
-    groups_ = upload(device_, independent_);
+    groups_ = samples ? groups_of(device_, independent_, device_.borrow<float>(samples->handle(), samples->size()))
+                      : upload(device_, independent_);
     features_.emplace(device_, auxiliary_, kinds_);
   });
   stages_.run("means and errors", [&] { parts_ = parts_of_mean(device_, groups_); });

@@ -27,7 +27,8 @@ double largest_buffer_of_mean(int groups);
 class RowsOnDevice {
  public:
   /// `request`: with the samples and features of these rows, which must outlive the object.
-  RowsOnDevice(Device& device, const MeanMixture& request, const Trial& trial);
+  /// `samples`: those of the request, if they are on the device already; null: they are copied.
+  RowsOnDevice(Device& device, const MeanMixture& request, const Trial& trial, const Buffer<float>* samples = nullptr);
   RowsOnDevice(Device& device, const PairMixture& request, const Trial& trial);
 
   /// What a network denoises: of all samples and of both halves.
