@@ -30,6 +30,7 @@ KINDS = {"mean": [],
          "network": ["--denoise", "auto"],
          "pair-filters": ["--estimator", "iicv", "--error", "--denoise", "auto", "--oidn", "off"],
          "pair-network": ["--estimator", "iicv", "--error", "--denoise", "auto"],
+         "pair-halves": ["--estimator", "iicv", "--error", "--device", "opencl"],
          "few-filters": ["--denoise", "auto", "--oidn", "off"],
          "few-network": ["--denoise", "auto"]}
 
@@ -89,7 +90,7 @@ def image_of(arguments, name, spp, seed, kind):
     films = ["--independent", film, "--features", film]
     if kind.startswith("pair"):
         films += ["--crn", arguments.work / f"{name}-{spp}-{seed}-crn.exr"]
-        if kind == "pair":
+        if kind in ("pair", "pair-halves"):
             films = films[:2] + films[4:]
     image.unlink(missing_ok=True)
     # Of dark rooms many pixels are 0 in all groups, which looks like one render twice.

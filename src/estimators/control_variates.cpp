@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
+#include "estimators/penalised_fit.h"
 #include "estimators/pixel_records.h"
 #include "filters/batch_algebra.h"
 #include "filters/neighbours.h"
@@ -25,18 +26,12 @@ constexpr int kTileWidth = 64, kTileHeight = 32;
 constexpr float kMinFreedom = 0.1f;
 
 /// Scratch memory of one thread.
-struct Workspace {
+struct Workspace : PenalisedFit {
   std::vector<vfloat> records;  ///< of the tile and its border
   std::vector<vint> keys;
   std::vector<uint16_t> chosen;
-  std::vector<vfloat> x;     ///< [neighbour][contrast]
   std::vector<vfloat> tail;  ///< [neighbour][rest of the record]
-  std::vector<vfloat> y;     ///< [contrast]
   std::vector<vfloat> y_tail;
-  std::vector<vfloat> penalty;  ///< [neighbour] V_h
-  std::vector<vfloat> beta;     ///< [neighbour]
-  std::vector<vfloat> gram, shift, inverse, b, gamma;
-  vfloat freedom = {};
 };
 
 struct Tile {
@@ -54,6 +49,8 @@ class Regression {
         T_(input.crn.groups),
         records_(input, settings, valid),
         layout_(records_.layout()),
+        shape_{settings.k,      layout_.contrasts,  layout_.group_contrasts, input.crn.groups,
+               settings.shared, settings.std_error, input.changes != nullptr},
         search_(settings.k, settings.window),
         radius_(settings.window / 2) {}
 
@@ -75,22 +72,13 @@ class Regression {
 
   void prepare(Workspace& w) const {
     if (!w.x.empty()) return;
-    const size_t k = s_.k, rows = layout_.contrasts, m = std::min(k, s_.shared ? rows : rows / 3);
+    w.PenalisedFit::prepare(shape_);
     w.records.resize(static_cast<size_t>(kTileWidth + 2 * radius_) * (kTileHeight + 2 * radius_) *
                      (layout_.stride / kLanes));
     w.keys.resize(search_.offsets().size());
     w.chosen.resize(search_.chosen_size());
-    w.x.resize(k * rows);
-    w.tail.resize(k * (layout_.size - rows));
-    w.y.resize(rows);
-    w.y_tail.resize(layout_.size - rows);
-    w.penalty.resize(k);
-    w.beta.resize(k);
-    w.shift.resize(m);
-    w.gram.resize(batch::packed_size(m + 1 + 3));
-    w.inverse.resize(m);
-    w.b.resize(std::max<size_t>(batch::kColumnsAtOnce * m, rows));
-    w.gamma.resize(k);
+    w.tail.resize(static_cast<size_t>(s_.k) * (layout_.size - layout_.contrasts));
+    w.y_tail.resize(layout_.size - layout_.contrasts);
   }
 
   /// Transposes the records at `source` (one per lane) into lanes: first the contrasts, then the tail.
@@ -128,7 +116,7 @@ class Regression {
     }
 
     for (int c = 0; c < 3; ++c) {
-      if (!s_.shared || c == 0) find_coefficients(c, s_.shared ? 3 : 1, w);
+      if (!s_.shared || c == 0) fit(c, s_.shared ? 3 : 1, w);
       finish_channel(c, x, y, n_lanes, w);
       if (s_.probe && s_.probe->y == y && s_.probe->x >= x && s_.probe->x < x + n_lanes) answer(c, x, w);
     }
@@ -217,67 +205,15 @@ class Regression {
     }
   }
 
-  /// Solves Eq. (10), as
-  ///   beta = (X^T X + (T - 1) V_h)^-1 X^T y
-  /// or, with fewer rows than neighbours, with Z = X V_h^-1/2, as
-  ///   V_h^1/2 beta = gamma = Z^T (Z Z^T + (T - 1) I)^-1 y.
-  /// On return, gamma holds the coefficients of the matrix in x: X, or Z in the second case; freedom holds the degrees
-  /// of freedom of the fit, trace(X (X^T X + (T - 1) V_h)^-1 X^T), as a fraction of those of the groups.
-  void find_coefficients(int first, int count, Workspace& w) const {
-    const int k = s_.k, all = layout_.contrasts, step = count == 3 ? 1 : 3, rows = all / step;
-    const int group_rows = layout_.group_contrasts / step;
-    const float T1 = static_cast<float>(T_ - 1);
+  /// The coefficients of the channels [first, first + count).
+  void fit(int first, int count, Workspace& w) const {
+    const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
     if (s_.mean_constraint > 0) scale_condition(first, count, w);
     find_penalties(first, count, w);
-    const vfloat* X = w.x.data() + first;
-    const vfloat* Y = w.y.data() + first;
-    if (k <= rows) {
-      batch::gram(X, all, step, k, rows, w.gram.data());
-      batch::multiply(X, all, step, Y, k, rows, w.gamma.data());
-      for (int i = 0; i < k; ++i) w.shift[i] = T1 * w.penalty[i];
-      const int n_more = s_.std_error ? rows - group_rows : 0;
-      for (int r = 0; r < n_more; ++r)
-        for (int i = 0; i < k; ++i)
-          w.gram[batch::packed(k + 1 + r, i)] = X[static_cast<size_t>(i) * all + (group_rows + r) * step];
-      batch::solve_shifted(w.gram.data(), w.shift.data(), k, w.gamma.data(), w.inverse.data(), n_more);
-      for (int i = 0; i < k; ++i) w.beta[i] = w.gamma[i];
-      if (s_.std_error) {
-        w.freedom = splat(static_cast<float>(k)) -
-                    batch::inverse_trace(w.gram.data(), w.inverse.data(), w.shift.data(), k, w.b.data());
-        for (int r = 0; r < n_more; ++r) {
-          vfloat norm = {};
-          for (int i = 0; i < k; ++i) {
-            const vfloat element = w.gram[batch::packed(k + 1 + r, i)];
-            norm = fma(element, element, norm);
-          }
-          w.freedom -= norm;
-        }
-      }
-    } else {
-      for (int i = 0; i < k; ++i) {
-        w.beta[i] = 1.0f / lanes::sqrt(w.penalty[i]);
-        vfloat* x = w.x.data() + static_cast<size_t>(i) * all + first;
-        for (int r = 0; r < rows; ++r) x[r * step] *= w.beta[i];
-      }
-      batch::gram(X, step, all, rows, k, w.gram.data());
-      for (int r = 0; r < rows; ++r) {
-        w.b[r] = Y[r * step];
-        w.shift[r] = splat(T1);
-      }
-      batch::solve_shifted(w.gram.data(), w.shift.data(), rows, w.b.data(), w.inverse.data());
-      for (int i = 0; i < k; ++i) {
-        vfloat g = {};
-        for (int r = 0; r < rows; ++r) g = fma(X[static_cast<size_t>(i) * all + r * step], w.b[r], g);
-        w.gamma[i] = g;
-        w.beta[i] *= g;
-      }
-      if (s_.std_error) {
-        for (int r = group_rows; r < rows; ++r) w.shift[r] = vfloat{};
-        w.freedom = splat(static_cast<float>(group_rows)) -
-                    batch::inverse_trace(w.gram.data(), w.inverse.data(), w.shift.data(), rows, w.b.data());
-      }
-    }
-    w.freedom /= static_cast<float>((T_ - 1) * count);
+    for (int c = first; shape_.wants_responses && c < first + count; ++c)
+      for (int i = 0; i < k; ++i)
+        w.responses[c * k + i] = tail_value(w.tail.data() + i * n_tail, layout_.difference + c);
+    w.find_coefficients(shape_, first, count);
   }
 
   /// Eq. (7) for one channel, and Eq. (8) if requested.
@@ -289,11 +225,30 @@ class Regression {
     // Squares of values above 10^18 overflow; such pixels take the independent image.
     for (int l = 0; l < n_lanes; ++l)
       result_.estimate.pixel(x + l, y)[c] = std::isfinite(estimate[l]) ? estimate[l] : in_.h->row(c, y)[x + l];
+    if (in_.changes) {
+      const vfloat shared_noise = own_covariance(c, x, y, w);
+      for (int l = 0; l < n_lanes; ++l)
+        result_.covariance.pixel(x + l, y)[c] =
+            std::isfinite(estimate[l] + shared_noise[l]) ? shared_noise[l] : in_.variance_of_h->row(c, y)[x + l];
+    }
     if (!s_.std_error) return;
     const vfloat error = lanes::sqrt(crn_variance(c, w) + independent_variance(c, w));
     for (int l = 0; l < n_lanes; ++l)
       result_.std_error.pixel(x + l, y)[c] =
           std::isfinite(error[l]) ? error[l] : std::sqrt(in_.variance_of_h->row(c, y)[x + l]);
+  }
+
+  /// cov(F^, h) of own_noise.h; the target is the first of its neighbours.
+  vfloat own_covariance(int c, int x, int y, const Workspace& w) const {
+    const vfloat* const u = w.responses.data() + static_cast<ptrdiff_t>(c) * s_.k;
+    vfloat of_all = {};
+    for (int i = 0; i < s_.k; ++i) of_all = fma(u[i], w.beta[i], of_all);
+    const vfloat of_target = u[0] * w.beta[0];
+    const vfloat of_errors = s_.symmetric ? of_all + of_target : 2 * of_target;  // as in find_penalties()
+    const auto at = [&](const Planes& planes) { return load(planes.row(c, y) + x); };
+    const vfloat penalties = (1 - s_.sample_fraction) * of_errors * at(in_.changes->errors) +
+                             s_.sample_fraction * of_target * at(in_.changes->variances);
+    return fma(w.beta[0], at(*in_.variance_of_h), static_cast<float>(T_ - 1) * penalties);
   }
 
   /// The first three terms of [YM2025] Eq. (8): variance of f - sum_i beta_i g_i. The coefficients were fitted to the
@@ -333,6 +288,7 @@ class Regression {
   const int T_;
   const PixelRecords records_;
   const RecordLayout layout_;
+  const FitShape shape_;
   const NeighbourSearch search_;
   const int radius_;
 };
@@ -344,6 +300,7 @@ void apply_control_variates(const ControlVariateInput& input, const ControlVaria
   const int width = input.crn.width, height = input.crn.height;
   result.estimate = Image(width, height, 3);
   result.std_error = settings.std_error ? Image(width, height, 3) : Image();
+  result.covariance = input.changes ? Image(width, height, 3) : Image();
   const Regression regression(input, settings, valid, result);
   const int columns = (width + kTileWidth - 1) / kTileWidth, rows = (height + kTileHeight - 1) / kTileHeight;
   PerThread<Workspace> workspaces;

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "estimators/estimator_result.h"
+#include "estimators/own_noise.h"
 #include "film/grouped_image.h"
 #include "filters/planes.h"
 #include "settings/settings.h"
@@ -81,6 +82,7 @@ struct ControlVariateInput {
   /// so that the coefficients in a region where the CRN image is black sum to one; without the constraint they are
   /// unchanged. Standard errors include c - sum_i beta_i c_i.
   const Planes* missing = nullptr;
+  const OwnChanges* changes = nullptr;  ///< optional: also find EstimatorResult::covariance
 };
 
 /// Fills `result.estimate` and, if requested, `result.std_error`; pixels with 0 in `valid` are left unchanged. All

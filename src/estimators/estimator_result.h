@@ -51,8 +51,9 @@ inline constexpr std::pair<const char*, double RiskRow::*> kRiskSums[] = {
     {"groups", &RiskRow::groups}};
 
 /// How an image was made, as far as it affects the meaning of these sums: mean of independent samples; an estimator of
-/// two passes; or candidates from filters, or from a network, mixed with either.
-enum class ErrorKind { kMean, kPair, kFilters, kNetwork, kPairFilters, kPairNetwork };
+/// two passes; candidates from filters, or from a network, mixed with either; or an estimator of two passes whose
+/// covariance with the samples is known from halves of them only, as on a device.
+enum class ErrorKind { kMean, kPair, kFilters, kNetwork, kPairFilters, kPairNetwork, kPairHalves };
 
 /// Bounds that contain the relMSE in 80 of 100 renders (risk/error_interval.h).
 struct ErrorInterval {
@@ -80,6 +81,9 @@ struct EstimatorResult {
   Image std_error;
   /// Bias of each value where it is significant, positive if too bright; zero elsewhere (risk/held_out_bias.h).
   Image bias;
+  /// Covariance of each value with the mean of the independent samples at the same pixel; empty if unknown. The error of
+  /// the estimate is derived from it (risk/image_risk.h).
+  Image covariance;
   /// Layers of the estimate that sum to it, in the order of MethodSettings::layers; empty if there were none.
   std::vector<Image> layers;
   /// For animation frames: means of both halves of the samples of this and previous frames, for the next frame

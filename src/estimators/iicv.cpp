@@ -5,9 +5,11 @@
 #include <optional>
 
 #include "core/error.h"
+#include "core/parallel.h"
 #include "estimators/control_variates.h"
 #include "estimators/method.h"
 #include "estimators/missing_light.h"
+#include "estimators/own_noise.h"
 #include "estimators/pair_steps.h"
 #include "estimators/pilot.h"
 
@@ -30,6 +32,14 @@ bool in_range(const IicvOptions& o) {
   return o.sample_fraction >= 0 && o.sample_fraction <= 1 && o.mean_constraint >= 0;
 }
 
+/// The covariance of the residual correction, which adds h with the weight `own`.
+void add_own_residual(const Moments& h, const Image& own, Image& covariance) {
+  parallel_for(own.height, 8, [&](int y) {
+    for (int x = 0; x < own.width; ++x)
+      for (int c = 0; c < 3; ++c) covariance.pixel(x, y)[c] += *own.pixel(x, y) * h.variance_of_mean.row(c, y)[x];
+  });
+}
+
 }  // namespace
 
 VariateSteps steps_of(const GroupedImage& crn, const GroupedImage& independent, const IicvOptions& options) {
@@ -37,7 +47,7 @@ VariateSteps steps_of(const GroupedImage& crn, const GroupedImage& independent, 
   std::vector<std::string> problems;
   check_k(options.k, options.window, problems);
   const bool needs_variance = options.penalty == Penalty::kSample || options.std_error || options.residual_correction ||
-                              options.sample_fraction > 0;
+                              options.covariance || options.sample_fraction > 0;
   check_inputs(crn, independent, 3, needs_variance ? 2 : 1, problems);
   throw_if_any(kIicv, problems);
 
@@ -63,11 +73,22 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
   const Moments g = moments(crn, valid, border, kFar), h = moments(independent, valid, border, 0.0f);
   ControlVariateInput input{crn, &g, &h.mean, &h.variance_of_mean, &h.variance_of_mean};
   std::optional<Planes> error, missing;
-  if (steps.error_of_h == ErrorOfH::kPilot) input.error_of_h = &error.emplace(pilot_error(g, h, kPilotWindow, border));
+  std::optional<Planes> slope;
+  std::optional<OwnChanges> changes;
+  if (steps.error_of_h == ErrorOfH::kPilot) {
+    if (options.covariance) slope.emplace(crn.width, crn.height, 3, 0, 0.0f);
+    input.error_of_h = &error.emplace(pilot_error(g, h, kPilotWindow, border, slope ? &*slope : nullptr));
+  }
+  if (options.covariance)
+    input.changes = &changes.emplace(
+        own_changes(independent, h, slope ? &*slope : nullptr, crn.groups, steps.settings.shared, valid));
   if (steps.missing_light) input.missing = &missing.emplace(missing_light(g, h, valid, border));
   apply_control_variates(input, steps.settings, valid, result);
   if (steps.residual_correction) {
-    add_residual_correction(h, steps.residual_options, valid, result.std_error, result.estimate);
+    Image own_weight = options.covariance ? Image(crn.width, crn.height, 1) : Image();
+    add_residual_correction(h, steps.residual_options, valid, result.std_error, result.estimate,
+                            options.covariance ? &own_weight : nullptr);
+    if (options.covariance) add_own_residual(h, own_weight, result.covariance);
     if (!steps.std_error) result.std_error = Image();
   }
   fill_invalid(crn, independent, valid, result.estimate);
@@ -109,7 +130,15 @@ Method make_iicv(Settings& p) {
   standard.max_first_spp = std::numeric_limits<int>::max();
   standard.reads_groups = true;
   Method estimator;
-  estimator.passes = pair_by(iicv, o);
+  PassPair pair = pair_by(iicv, o);
+  if (o.residual_correction)  // otherwise no risk is told (below)
+    pair.image = [o](const GroupedImage& crn, const GroupedImage& independent, const MethodSettings& settings) {
+      IicvOptions own = o;
+      own.std_error = settings.std_error;
+      own.covariance = settings.std_error && settings.held_out;
+      return iicv(crn, independent, own);
+    };
+  estimator.passes = pair;
   estimator.adaptive =
       ask_for_adaptive(p, standard, "The CRN pass decides how many independent samples each pixel gets");
 
@@ -121,6 +150,10 @@ Method make_iicv(Settings& p) {
   estimator.min_groups = 3;
   estimator.halo = iicv_halo(o);
   estimator.memory.always = iicv_bytes_per_pixel(o);
+  if (o.residual_correction) {  // what the covariance takes: slope, changes, itself, own weights
+    estimator.memory.of_halves = (3 + 6 + 3 + 1) * sizeof(float);
+    estimator.memory.groups_for_halves = 2 * estimator.min_groups;
+  }
   return estimator;
 }
 

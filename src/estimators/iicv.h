@@ -61,6 +61,9 @@ struct IicvOptions {
   /// Also estimate the standard error of the result: [YM2025] Eq. (8), with the residuals of the fit corrected for its
   /// degrees of freedom. It refers to the result before the residual correction, which changes the error little.
   bool std_error = false;
+  /// Also find EstimatorResult::covariance, to first order (own_noise.h), including the residual correction's direct
+  /// part. With pixels of fewer than 3 independent groups, penalties count as fixed.
+  bool covariance = false;
   PixelProbe* probe = nullptr;  ///< optional; inside the image
 
   /// The published estimator with its published settings.

@@ -13,6 +13,9 @@ namespace covary {
 /// exactly the same value, 0 to others.
 ///
 /// If pixels of the independent image have unequal counts n_j, weights are n_j w_j.
-Planes pilot_error(const Moments& g, const Moments& h, int window, int border);
+///
+/// `slope`: optional, 3 planes without border that receive half the derivative of the result by the pixel's own h,
+/// (1 - w) (h - mean), where w is its fraction of the weights.
+Planes pilot_error(const Moments& g, const Moments& h, int window, int border, Planes* slope = nullptr);
 
 }  // namespace covary

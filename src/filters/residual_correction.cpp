@@ -45,6 +45,8 @@ struct GuidedMean {
   vfloat weights = {}, residuals[3] = {}, squares = {};  ///< squares: sum of w^2 var h
   /// Zero if nothing is similar.
   vfloat value(int c) const { return residuals[c] / max(weights, splat(1e-20f)); }
+  /// The pixel's own part of it: in cells, which hold it with its weight at the centre, about the same.
+  vfloat own() const { return weights > 1e-3f ? 1 / weights : vfloat{}; }
   /// t / (t + v), where v is the mean's variance summed over RGB and t = `tolerated`. 0 without weights, or beyond the
   /// range of floats.
   vfloat share(vfloat tolerated) const {
@@ -94,7 +96,12 @@ void add_everywhere(const std::vector<unsigned char>& valid, const Image& std_er
 }  // namespace
 
 void add_residual_correction(const Moments& h, const ResidualCorrectionOptions& options,
-                             const std::vector<unsigned char>& valid, const Image& std_error, Image& estimate) {
+                             const std::vector<unsigned char>& valid, const Image& std_error, Image& estimate,
+                             Image* own_weight) {
+  const auto add_own_weight = [&](int x, int y, vfloat weight) {
+    if (!own_weight) return;
+    for (int l = 0; l < std::min(kLanes, estimate.width - x); ++l) *own_weight->pixel(x + l, y) += weight[l];
+  };
   const float bandwidth = options.bandwidth * options.bandwidth;
   {
     const int wide_radius = options.window / 2 / kCell, narrow_radius = options.window / 4;
@@ -105,6 +112,7 @@ void add_residual_correction(const Moments& h, const ResidualCorrectionOptions& 
       const GuidedMean wide =
           guided_mean<kCell>(cells, wide_radius, x, y, f, variance * (bandwidth * kWidening * kWidening));
       const vfloat a = narrow.share(kNoise * variance), b = (1 - a) * wide.share(kWideNoise * variance);
+      add_own_weight(x, y, a * narrow.own() + b * wide.own());
       std::array<vfloat, 3> result;
       for (int c = 0; c < 3; ++c) result[c] = a * narrow.value(c) + b * wide.value(c);
       return result;
@@ -117,6 +125,7 @@ void add_residual_correction(const Moments& h, const ResidualCorrectionOptions& 
     const GuidedMean mean =
         guided_mean<kResidualCell>(cells, radius, x, y, f, variance * (bandwidth * kSecondWidening * kSecondWidening));
     const vfloat b = mean.share(kWideNoise * variance);
+    add_own_weight(x, y, b * mean.own());
     return std::array<vfloat, 3>{b * mean.value(0), b * mean.value(1), b * mean.value(2)};
   };
   add_everywhere(valid, std_error, second, estimate);

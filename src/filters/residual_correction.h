@@ -64,9 +64,11 @@ inline int residual_correction_halo(const ResidualCorrectionOptions& options) {
 }
 
 /// Adds the correction to `estimate`, whose standard error is `std_error`. `h`: mean and variance of the independent
-/// image. Pixels with 0 in `valid` are ignored and left unchanged.
+/// image. Pixels with 0 in `valid` are ignored and left unchanged. `own_weight`: optional, an image of one channel that
+/// receives the weight of a pixel's own h in what is added to it, the same in all channels.
 void add_residual_correction(const Moments& h, const ResidualCorrectionOptions& options,
-                             const std::vector<unsigned char>& valid, const Image& std_error, Image& estimate);
+                             const std::vector<unsigned char>& valid, const Image& std_error, Image& estimate,
+                             Image* own_weight = nullptr);
 
 /// Adds the residual to `estimate`; other arguments as above.
 void add_residual(const Moments& h, const ResidualOptions& options, const std::vector<unsigned char>& valid,

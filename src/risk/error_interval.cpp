@@ -59,7 +59,7 @@ void scale_candidates(MeasuredRisks& risks, double factor, double variance_over_
 bool fitted_to_few(ErrorKind kind) { return kind == ErrorKind::kFilters || kind == ErrorKind::kNetwork; }
 
 bool is_mixture(ErrorKind kind, double groups) {
-  return kind != ErrorKind::kMean && kind != ErrorKind::kPair && groups >= kMinGroups;
+  return kind != ErrorKind::kMean && kind != ErrorKind::kPair && kind != ErrorKind::kPairHalves && groups >= kMinGroups;
 }
 
 /// Fraction of log(relMSE / V) explained by an image's features: less, the closer a mixture is to the mean.

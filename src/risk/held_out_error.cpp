@@ -102,17 +102,38 @@ double place(const Image& disagreement, const Image& weights, Image& std_error) 
   return after > 0 ? before / after : 1;
 }
 
+/// What the covariance tells that the estimator knows. Bias is unknown: only halves show where it is.
+void add_rows_in_closed_form(const GroupedImage& independent, const std::vector<unsigned char>& valid,
+                             MethodImage& whole) {
+  const Moments h = moments(independent, valid, 0, 0.0f);
+  ImageRiskInput input;
+  input.image = input.guide = &whole.estimate;
+  input.independent = &h;
+  input.groups = &independent;
+  input.valid = &valid;
+  input.covariance = &whole.covariance;
+  input.std_error = &whole.std_error;
+  whole.risk_rows = image_risk(input);
+  whole.risk_kind = ErrorKind::kPair;
+  whole.covariance = {};
+}
+
 MethodImage image_with_rows(const Method& base, const GroupedImage& crn, const GroupedImage& independent,
                             const MethodSettings& settings) {
-  MethodImage whole = base.image({crn, independent}, settings);
-  if (!settings.std_error || !settings.held_out || crn.groups < 2 * base.min_groups ||
-      independent.groups < 2 * base.min_groups)
+  MethodSettings own = settings;
+  own.held_out =
+      settings.std_error && settings.held_out && std::min(crn.groups, independent.groups) >= 2 * base.min_groups;
+  MethodImage whole = base.image({crn, independent}, own);
+  if (!own.held_out) return whole;
+  long ignored = 0;
+  const std::vector<unsigned char> valid = finite_pixels(crn, independent, ignored);
+  if (!whole.covariance.data.empty()) {
+    add_rows_in_closed_form(independent, valid, whole);
     return whole;
+  }
   MethodSettings half_settings = settings;
   half_settings.std_error = false;
   half_settings.crn_samples = std::max<int64_t>(1, settings.crn_samples / 2);
-  long ignored = 0;
-  const std::vector<unsigned char> valid = finite_pixels(crn, independent, ignored);
   std::array<Image, 2> images;
   std::array<Moments, 2> h;
   for (int half : {0, 1}) {
@@ -124,7 +145,7 @@ MethodImage image_with_rows(const Method& base, const GroupedImage& crn, const G
   const std::array<const Moments*, 2> held_out = {&h[0], &h[1]};
   const Moments all = moments(independent, valid, 0, 0.0f);
   whole.risk_rows = image_risk({&whole.estimate, halves, &all, held_out, &independent, &whole.estimate, &valid});
-  whole.risk_kind = ErrorKind::kPair;
+  whole.risk_kind = ErrorKind::kPairHalves;
   whole.bias = held_out_bias({halves, halves, held_out, &valid});
   return whole;
 }
@@ -134,11 +155,13 @@ MethodImage image_with_rows(const Method& base, const GroupedImage& crn, const G
 Method with_held_out_rows(const Method& base) {
   if (!base.holds_out || base.adaptive) return base;
   Method method = base;
-  // The images and moments of both halves, the moments of all samples, and half of the groups of both images.
-  method.memory.of_halves = (2 * (3 + 6) + 6) * sizeof(float);
-  method.memory.of_halves_per_group = 3 * sizeof(float);
-  method.memory.groups_for_halves = 2 * base.min_groups;
-  if (base.halo >= 0) method.halo += kBiasHalo;
+  if (base.memory.of_halves == 0) {  // it does not tell its covariance
+    // The images and moments of both halves, the moments of all samples, and half of the groups of both images.
+    method.memory.of_halves = (2 * (3 + 6) + 6) * sizeof(float);
+    method.memory.of_halves_per_group = 3 * sizeof(float);
+    method.memory.groups_for_halves = 2 * base.min_groups;
+    if (base.halo >= 0) method.halo += kBiasHalo;
+  }
   std::get<PassPair>(method.passes).image = [base](const GroupedImage& crn, const GroupedImage& independent,
                                                    const MethodSettings& settings) {
     return image_with_rows(base, crn, independent, settings);

@@ -66,8 +66,9 @@ std::vector<HeldOutRow> held_out_rows(const HeldOutInput& input);
 /// same.
 HalvesRisk risk_of_halves(const std::vector<HeldOutRow>& rows, double n_valid_pixels);
 
-/// A method that also tells the error and the bias of its image from both halves of the samples, if they have enough
-/// groups. Only for methods with Method::holds_out; others are returned unchanged.
+/// A method that also tells the error of its image, if the samples have enough groups for halves: from the covariance
+/// with them if the method tells it (EstimatorResult::covariance), otherwise from images of both halves, with its bias.
+/// Only for methods with Method::holds_out; others are returned unchanged.
 Method with_held_out_rows(const Method& base);
 
 }  // namespace covary

@@ -25,6 +25,14 @@ PixelRisk risk_at(const ImageRiskInput& in, int x, int y) {
   for (int c = 0; c < 3; ++c) {
     const double h = in.independent->mean.row(c, y)[x], v = in.independent->variance_of_mean.row(c, y)[x];
     pixel.noise += v;
+    const double square_of_residual = square(in.image->pixel(x, y)[c] - h);
+    if (in.covariance) {
+      const double twice_covariance = 2 * in.covariance->pixel(x, y)[c];
+      pixel.error += square_of_residual - v + twice_covariance;
+      pixel.covariance += twice_covariance;
+      pixel.variance += square(in.std_error->pixel(x, y)[c]);
+      continue;
+    }
     if (!in.halves[0]) {  // M is h: its error is its variance, and no correction is needed
       pixel.error += v, pixel.variance += v;
       continue;
@@ -35,7 +43,7 @@ PixelRisk risk_at(const ImageRiskInput& in, int x, int y) {
       g[half] = in.independents[half]->mean.row(c, y)[x];
     }
     const double twice_covariance = 0.5 * (m[0] - m[1]) * (g[0] - g[1]);
-    pixel.error += square(in.image->pixel(x, y)[c] - h) - v + twice_covariance;
+    pixel.error += square_of_residual - v + twice_covariance;
     pixel.covariance += twice_covariance;
     pixel.variance += 0.25 * square(m[0] - m[1]);
   }
@@ -118,7 +126,7 @@ RiskRow risk_of_row(const ImageRiskInput& in, int y) {
       row.noise += w * pixel.noise, row.noise_squares += square(w * pixel.noise);
       if (is_specular(in.surfaces, x, y)) row.specular_noise += w * pixel.noise;
       row.values += 3;
-      if (in.halves[0]) row.spread += spread_at(in, x, y);
+      if (in.halves[0] || in.covariance) row.spread += spread_at(in, x, y);
       add_groups(in, x, y, w, row);
     }
     if (x % kPart != kPart - 1 && x != width - 1) continue;

@@ -5,8 +5,8 @@
 //
 //     E (M - mu)^2 = E[ (M - h)^2 - v + 2 cov(M, h) ],
 //
-// including bias. The covariance, there from derivatives of the filter, comes from both halves of the samples: for an M
-// that is locally linear in them,
+// including bias. The covariance, there from derivatives of the filter, is told by the estimator that made M
+// (EstimatorResult::covariance), or comes from both halves of the samples: for an M that is locally linear in them,
 //
 //     cov(M, h) = E[ (M_A - M_B) (h_A - h_B) ] / 4,   and likewise   var M = E (M_A - M_B)^2 / 4.
 //
@@ -32,7 +32,9 @@ struct ImageRiskInput {
   const GroupedImage* groups = nullptr;             ///< the groups whose mean is h
   const Image* guide = nullptr;                     ///< errors are relative to its brightness
   const std::vector<unsigned char>* valid = nullptr;
-  Features surfaces = {};  ///< tell mirrors and glass, where the surfaces behind them are known, too
+  Features surfaces = {};             ///< tell mirrors and glass, where the surfaces behind them are known, too
+  const Image* covariance = nullptr;  ///< cov(M, h), if known; then no halves are needed
+  const Image* std_error = nullptr;   ///< then, the root of var M
 };
 
 /// Sums over each row of the image. Rows are independent, so those of bands can be joined. Bit-identical for any number

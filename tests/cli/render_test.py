@@ -134,7 +134,7 @@ class Plans(RenderTest):
         self.same("a.exr", "b.exr")
         info = json.loads(self.good("info", "a.exr", "--json").stdout)
         self.assertEqual(set(info["channels"]),
-                         {f"{layer}{c}" for layer in ("", "StdError.", "Bias.") for c in "RGB"})
+                         {f"{layer}{c}" for layer in ("", "StdError.") for c in "RGB"})
         self.assertEqual(info["attributes"]["covary:estimator"], "iicv")
         self.assertFalse(list(self.path.glob("*.passes")), "passes are not left behind")
 
