@@ -81,8 +81,8 @@ struct EstimatorResult {
   Image std_error;
   /// Bias of each value where it is significant, positive if too bright; zero elsewhere (risk/held_out_bias.h).
   Image bias;
-  /// Covariance of each value with the mean of the independent samples at the same pixel; empty if unknown. The error of
-  /// the estimate is derived from it (risk/image_risk.h).
+  /// Covariance of each value with the mean of the independent samples at the same pixel; empty if unknown. It tells
+  /// the error of the estimate (risk/image_risk.h).
   Image covariance;
   /// Layers of the estimate that sum to it, in the order of MethodSettings::layers; empty if there were none.
   std::vector<Image> layers;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "core/error.h"
 #include "core/parallel.h"
@@ -131,16 +132,16 @@ Method make_iicv(Settings& p) {
   standard.reads_groups = true;
   Method estimator;
   PassPair pair = pair_by(iicv, o);
-  if (o.residual_correction)  // otherwise no risk is told (below)
+  estimator.adaptive =
+      ask_for_adaptive(p, standard, "The CRN pass decides how many independent samples each pixel gets");
+  if (o.residual_correction && !estimator.adaptive)  // otherwise no risk is derived from it (risk/held_out_error.h)
     pair.image = [o](const GroupedImage& crn, const GroupedImage& independent, const MethodSettings& settings) {
       IicvOptions own = o;
       own.std_error = settings.std_error;
       own.covariance = settings.std_error && settings.held_out;
       return iicv(crn, independent, own);
     };
-  estimator.passes = pair;
-  estimator.adaptive =
-      ask_for_adaptive(p, standard, "The CRN pass decides how many independent samples each pixel gets");
+  estimator.passes = std::move(pair);
 
   estimator.summary = "imperfect image-space control variates";
   estimator.predicts_error = true;

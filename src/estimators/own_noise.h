@@ -8,8 +8,8 @@
 //
 //     cov(F^_c, h_c) = beta_0 v_c + (T - 1) sum_i u_ic beta_i cov(V_i, h_c),   u_c = A^-1 (g_c - h_c),
 //
-// c: channel, v: variance of h. The penalty is (1 - s) (e_0 + e_i) T / 2 + s T v_i, summed over channels, with the error
-// e_0 = (p - h)^2 by a pilot p in which h has the weight w, so that
+// c: channel, v: variance of h. The penalty is (1 - s) (e_0 + e_i) T / 2 + s T v_i, summed over channels, with the
+// error e_0 = (p - h)^2 by a pilot p in which h has the weight w, so that
 //
 //     cov(V_i, h_c) = (1 - s) (1 + [i = 0]) E_c + s [i = 0] S_c,
 //     E_c = T sum_c' (1 - w) (h_c' - p_c') cov(h_c', h_c),   S_c = T sum_c' cov(v_c', h_c).
