@@ -76,8 +76,9 @@ void check_inputs(const GroupedImage& crn, const GroupedImage& independent, int 
                                      counted(image.groups, "group"), image.data ? "" : ", no data"));
   };
   if (crn.data == independent.data && crn.width == independent.width) {
+    const size_t n_others = problems.size();
     check_not_empty("image", independent);
-    if (!problems.empty()) return;
+    if (problems.size() > n_others) return;
   }
   check_not_empty("CRN image", crn);
   check_not_empty("independent image", independent);
