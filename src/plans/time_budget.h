@@ -31,8 +31,8 @@ TimePlan plan_time(const TimeCosts& costs, double seconds, uint32_t fewest, uint
 inline constexpr double kAuxiliaryShare = 0.15;
 
 /// Seconds that the end takes for an image of `height` rows, from trials of few of them: trial(rows) returns its
-/// seconds, of which the first is longer because it loads what the others use. No further trial is made that would make
-/// all of them take longer than `allowed` seconds.
+/// seconds, of which the first is longer because it loads what the others use. A second one is made unless the first
+/// took more than twice the `allowed` seconds; after it, none that would make all of them take longer than these.
 double time_of_end(int height, double allowed, const std::function<double(int rows)>& trial);
 inline constexpr double kTrialShare = 0.15;  ///< of the time, for these trials
 
