@@ -180,6 +180,7 @@ void experiment(ExperimentCommand command) {
   make_output_folder(command.output);
   const std::string scenes =
       command.scenes.empty() ? lab::scenes_folder(suite, command.suite, program_path()) : command.scenes;
+  check_scenes(suite, command.suite, scenes);
   check_files(command, suite, scenes, command.output);
   lab::ExperimentOptions options = run_options(command, scenes, programs);
   if (!command.quiet && command.the_part.of == 0) tell_time(suite, options);

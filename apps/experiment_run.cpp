@@ -99,6 +99,16 @@ std::string read_file(const std::string& path) {
   return text.str();
 }
 
+void check_scenes(const lab::Suite& suite, const std::string& name, const std::string& folder) {
+  const auto is_there = [&](const lab::SceneEntry& scene) { return fs::exists(fs::path(folder) / scene.file); };
+  if (suite.scenes.empty() || std::ranges::any_of(suite.scenes, is_there) || !lab::builtin_suites().contains(name))
+    return;
+  throw Error(ErrorCode::kIo,
+              fmt::format("'{0}' has none of the scenes of {1}; `covary scenes {1} --folder {0}` says which "
+                          "are missing, and `covary scenes {1}` where they come from",
+                          folder, name));
+}
+
 void check_files(const ExperimentCommand& command, const lab::Suite& suite, const std::string& scenes,
                  const std::string& folder) {
   Outputs outputs;

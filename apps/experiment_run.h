@@ -34,6 +34,9 @@ std::string read_file(const std::string& path);
 
 /// Makes the folder of the results. Throws Error.
 
+/// Throws Error(kIo) if the folder has none of the scenes of a built-in suite.
+void check_scenes(const lab::Suite& suite, const std::string& name, const std::string& folder);
+
 /// Before the experiment begins: results in `folder` must not overwrite anything that it reads, or unrelated files.
 void check_files(const ExperimentCommand& command, const lab::Suite& suite, const std::string& scenes,
                  const std::string& folder);

@@ -121,11 +121,22 @@ void MeanFeature::add(const std::string& path, std::optional<Image> image) {
   if (sum_->data.size() != image->data.size() || sum_->width != image->width)
     throw Error(ErrorCode::kInput, fmt::format("'{}' has {} x {} pixels, others have {} x {}", path, image->width,
                                                image->height, sum_->width, sum_->height));
+  if (++n_images_ == 2) compare_with_first(*image);
   for (size_t i = 0; i < n_.size(); ++i) {
     if (std::isnan(image->data[3 * i])) continue;
     ++n_[i];
     for (size_t c = 3 * i; c < 3 * i + 3; ++c) sum_->data[c] += image->data[c];
   }
+}
+
+void MeanFeature::compare_with_first(const Image& second) {
+  double differences = 0, squares = 0;  // of pixels that both have
+  for (size_t i = 0; i < n_.size(); ++i)
+    for (size_t c = 3 * i; n_[i] == 1 && std::isfinite(second.data[3 * i]) && c < 3 * i + 3; ++c) {
+      const double a = sum_->data[c], b = second.data[c];
+      differences += (a - b) * (a - b), squares += a * a + b * b;
+    }
+  noise_ = squares > 0 ? differences / squares : 0;
 }
 
 std::optional<Image> MeanFeature::mean() const {
@@ -177,6 +188,14 @@ FeatureLayers::FeatureLayers(const FeatureSearch& search) {
     of_normal.add(path, feature(search.normal, FeatureKind::kNormal));
     of_position.add(path, feature("", FeatureKind::kPosition));
   }
+  // Of the samples that are the picture's, too; covary's are of others.
+  constexpr double kNoisy = 1e-3;
+  if (!are_own_ && of_albedo.noise() > kNoisy)
+    fmt::print(
+        stderr,
+        "warning: the albedo differs by {:.2g} % from render to render: the predicted error may be too low, as noise "
+        "that features share with the picture passes for detail; more samples, or features rendered apart, help\n",
+        100 * std::sqrt(2 * of_albedo.noise()));
   albedo = of_albedo.mean(), normal = of_normal.mean(), position = of_position.mean();
   if (!albedo) normal.reset();  // Open Image Denoise only takes normals together with an albedo
 }

@@ -37,9 +37,15 @@ class MeanFeature {
   /// Throws Error(kInput), naming the file, if the size differs.
   void add(const std::string& path, std::optional<Image> image);
   std::optional<Image> mean() const;
+  /// Half the mean squared difference of the first two images over their mean square; 0 with fewer.
+  double noise() const { return noise_; }
 
  private:
+  void compare_with_first(const Image& second);
+
   std::optional<Image> sum_;
+  double noise_ = 0;
+  int n_images_ = 0;
   std::vector<uint16_t> n_;  // of each pixel
 };
 

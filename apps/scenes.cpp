@@ -16,6 +16,7 @@
 #include "declared_options.h"
 #include "io/load_scene.h"
 #include "lab/suite.h"
+#include "papers/paper.h"
 #include "plans/integrator_choice.h"
 #include "value_names.h"
 
@@ -32,7 +33,7 @@ struct ScenesOptions {
 struct KnownScene {
   std::string credit;
   bool is_own = false;  ///< comes with covary; those of others are in folders of their own
-  std::set<std::string> suites;
+  std::set<std::string> suites, papers;
 };
 
 /// Content hashes (`covary info`) of the scenes that the tables in docs/ were measured with.
@@ -55,7 +56,7 @@ bool is_called(const std::string& file, const std::string& name) {
   return file == name || file.starts_with(name + "/") || file.substr(0, file.rfind('.')) == name;
 }
 
-/// By file. Throws Error(kUsage) for a name that neither a built-in suite nor a scene of one has.
+/// By file. Throws Error(kUsage) for a name that no built-in suite, paper or scene of one has.
 std::map<std::string, KnownScene> known_scenes(const std::vector<std::string>& only) {
   std::map<std::string, KnownScene> scenes;
   std::vector<std::string> suites, names;
@@ -68,10 +69,18 @@ std::map<std::string, KnownScene> known_scenes(const std::vector<std::string>& o
       scene.suites.insert(name);
     }
   }
+  for (const auto& [paper, text] : lab::builtin_papers()) {
+    const lab::Paper read = lab::parse_paper(std::string(text), paper);
+    for (auto& [file, scene] : scenes)
+      if (std::ranges::any_of(read.parts,
+                              [&](const lab::PaperPart& part) { return scene.suites.contains(part.suite); }))
+        scene.papers.insert(paper);
+    suites.push_back(paper);
+  }
   names = suites;
   for (const auto& [file, scene] : scenes) names.push_back(file.substr(0, file.find_first_of("./")));
   const auto is_asked = [](const std::string& name, const auto& scene) {
-    return scene.second.suites.contains(name) || is_called(scene.first, name);
+    return scene.second.suites.contains(name) || scene.second.papers.contains(name) || is_called(scene.first, name);
   };
   for (const std::string& name : only)
     if (std::ranges::none_of(scenes, [&](const auto& scene) { return is_asked(name, scene); }))
@@ -142,7 +151,8 @@ void add_scenes(CLI::App& app) {
   const auto o = std::make_shared<ScenesOptions>();
   CLI::App* command =
       app.add_subcommand("scenes", "List the scenes of the built-in suites, and check a folder of them");
-  add_value(*command, "SUITE", o->suites, "NAME", "Only those of these suites, or these scenes; default: all");
+  add_value(*command, "SUITE", o->suites, "NAME",
+            "Only those of these suites or papers, or these scenes; default: all");
   add_value(*command, "--folder", o->folder, kFolderValue,
             "Say which of them this folder has, and whether they are those that the tables were measured with");
   command->callback([o] { run(*o); });

@@ -12,6 +12,7 @@ import operator
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from os import PathLike, fspath
+from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from ._keywords import RenderOptions
@@ -308,3 +309,10 @@ def check_some(function: Callable[..., Any], given: Mapping[str, Any], of: str =
     rules: Mapping[str, Rule] = function.rules  # type: ignore[attr-defined]
     return {name: rules[name](f"{of}[{name!r}]" if of else name, value)
             for name, value in given.items() if name in rules}
+
+
+def make_last_folder(file: str | PathLike[str]) -> None:
+    """The last folder of an output's name is made if need be, as by the program; others are missing by mistake."""
+    folder = Path(file).parent
+    if not folder.exists() and folder.parent.is_dir():
+        folder.mkdir(exist_ok=True)

@@ -7,7 +7,9 @@ from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
 from . import _covary
-from ._arguments import array, attribute_texts, checked, either, empty_or, flag, list_of, optional, path, text
+from ._arguments import (
+    array, attribute_texts, checked, either, empty_or, flag, list_of, make_last_folder, optional, path, text,
+)
 from .errors import _warn
 
 if TYPE_CHECKING:
@@ -31,6 +33,7 @@ def read_image(path: str | PathLike[str], layer: str = "", *, accept_changed: bo
 def write_image(path: str | PathLike[str], image: Any, attributes: dict[str, str] | None = None) -> None:
     """Writes linear RGB [H, W, 3] in the format of the extension: .exr .pfm .tif .hdr .png .jpg. Raises UsageError
     for other names."""
+    make_last_folder(path)
     _covary.write_image(fspath(path), image, attributes or {})
 
 

@@ -93,6 +93,11 @@ class Experiment:
     results: dict[str, Any] = field(repr=False)
 
     @property
+    def warnings(self) -> list[str]:
+        """What makes the numbers doubtful, as the report and the terminal say it; also issued as CovaryWarning."""
+        return list(self.results["warnings"])
+
+    @property
     def rows(self) -> list[dict[str, Any]]:
         """results.csv, a dictionary for each line, for `pandas.DataFrame(rows)`."""
         with open(self.folder / "results.csv", encoding="utf-8", newline="") as file:
@@ -306,4 +311,7 @@ def experiment(suite: str | PathLike[str] | dict[str, Any], output: str | PathLi
     if isinstance(watcher, _Runs):
         watcher.end()
     made = Path(output)
-    return Experiment(made, json.loads((made / "results.json").read_text(encoding="utf-8")))
+    found = Experiment(made, json.loads((made / "results.json").read_text(encoding="utf-8")))
+    for warning in found.warnings:
+        _warn(warning)
+    return found

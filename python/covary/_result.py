@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _covary
-from ._arguments import checked, flag, instance, optional, path, real
+from ._arguments import checked, flag, instance, make_last_folder, optional, path, real
 from .errors import Error, UsageError
 
 if TYPE_CHECKING:
@@ -98,6 +98,7 @@ class Result:
         if not overwrite and file.is_file() and not _covary.is_made_by(fspath(path), _SAVE):
             raise UsageError(f"path: '{fspath(path)}' already exists, and save() did not make it; give another name, "
                              "or overwrite=True to replace it")
+        make_last_folder(path)
         attributes = {f"covary:{name}": value for name, value in self._attributes().items()}
         if Path(path).suffix.lower() == ".exr":
             _covary.write_result(fspath(path), self.image, self.std_error, self.bias, self.aovs, attributes)

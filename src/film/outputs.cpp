@@ -84,12 +84,11 @@ bool is_made_by(const std::string& path, const std::string& command) {
   }
 }
 
-bool is_made_by_covary(const std::string& path) {
+bool is_render(const std::string& path) {
   std::error_code ignored;
   if (fs::is_regular_file(path, ignored) && fs::file_size(path, ignored) == 0) return true;
   try {
-    const std::map<std::string, std::string> attributes = inspect_image(path, ChecksumPolicy::kIgnore).attributes;
-    return std::ranges::any_of(attributes, [](const auto& entry) { return entry.first.starts_with("covary:"); });
+    return inspect_image(path, ChecksumPolicy::kIgnore).attributes.contains("covary:scene_hash");
   } catch (const Error&) {
     return false;  // damaged, or something else under this name
   }

@@ -59,8 +59,9 @@ class Outputs {
 /// of EXR files; of PNG, JPEG, TIFF and videos, only whether covary did. Other formats, such as HDR and PFM, do not
 /// tell: false. Empty files are nobody's: true.
 bool is_made_by(const std::string& path, const std::string& command);
-/// Whether covary made the image, by a command or as a library, according to its attributes. Empty files: true.
-bool is_made_by_covary(const std::string& path);
+/// Whether covary rendered the image, by a command or as a library, according to the attribute of its scene. Empty
+/// files are nobody's: true.
+bool is_render(const std::string& path);
 
 /// Text in videos of covary.
 inline constexpr const char* kMadeByCovary = "made by covary convert";

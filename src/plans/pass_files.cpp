@@ -168,8 +168,8 @@ bool asks_for_more(const RenderRequest& request, const MadeFile& picture) {
 void check_earlier_films(const Plan& plan, const RenderRequest& request) {
   if (request.output.empty() || request.overwrite) return;
   std::error_code ignored;
-  if (fs::is_regular_file(request.output, ignored) && !is_made_by_covary(request.output))
-    throw Error(ErrorCode::kInput, fmt::format("'{}' already exists, and covary did not make it; give another name, or "
+  if (fs::is_regular_file(request.output, ignored) && !is_render(request.output))
+    throw Error(ErrorCode::kInput, fmt::format("'{}' already exists, and is no render of covary; give another name, or "
                                                "`overwrite` to replace it",
                                                request.output));
   const bool is_film = outputs_film(plan, request);

@@ -27,6 +27,12 @@ class Scenes(CliTest):
         self.assertEqual(len(kitchen.splitlines()), 4)
         self.assertIn("https://benedikt-bitterli.me/resources/", kitchen)
         self.assertIn("room.xml\n", self.good("scenes", "room").stdout)
+        paper = self.good("scenes", "iicv").stdout
+        self.assertIn("kitchen/scene_v3.xml\n", paper)
+        self.assertNotIn("cms-rgbsofa", paper)
+        (self.path / "none").mkdir()
+        self.bad(1, "'none' has none of the scenes of iicv-table1; `covary scenes iicv-table1 --folder none` says",
+                 "experiment", "iicv-table1", "--scenes", "none", "-o", "out")
 
     def test_a_folder_that_is_missing(self):
         self.bad(1, "--folder 'nowhere': there is no such folder", "scenes", "iicv-table1", "--folder", "nowhere")

@@ -176,6 +176,9 @@ class Images(PackageTest):
         for name in ("a.exr", "a.png", "a.tif"):
             for _ in range(2):
                 result.save(self.path / name)
+        result.save(self.path / "made" / "a.png")  # in its last folder
+        deep = self.path / "no" / "where" / "a.png"
+        self.assertIn("no such folder", self.message_of(covary.IoError, result.save, deep))
         other = self.path / "other.png"
         other.write_bytes(b"something else")
         for path in (render, other):
@@ -192,8 +195,8 @@ class Images(PackageTest):
         message = self.message_of(OSError, covary.read_image, missing)
         self.assertIn(message, self.failure_of_program("compare", missing, "--reference", missing))
         self.assertIn("image: found", self.message_of(TypeError, covary.write_image, "x.exr", [1]))
-        self.assertIn("/nowhere/x.exr", self.message_of(covary.IoError, covary.write_image, "/nowhere/x.exr",
-                                                        noisy(6, False)[0]))
+        self.assertIn("/nowhere/no/x.exr", self.message_of(covary.IoError, covary.write_image, "/nowhere/no/x.exr",
+                                                            noisy(6, False)[0]))
 
     def test_features_that_are_none(self):
         """Another render in place of the albedo, as after `covary denoise a.exr b.exr`, is told."""
