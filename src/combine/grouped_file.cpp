@@ -58,6 +58,21 @@ double samples_per_pixel(const ExrFile& file, const std::string& path) {
 
 std::string number_of(double samples) { return samples > 0 ? fmt::format("{:g}", samples) : "an unknown number of"; }
 
+/// Of files whose names differ in digits alone, as frames of a sequence do that a shell has listed.
+std::string hint_of_frames(const std::string& a, const std::string& b) {
+  std::string pattern = a;
+  bool differ = false;
+  for (size_t i = 0; i < a.size() && a.size() == b.size(); ++i) {
+    const auto is_digit = [](char c) { return std::isdigit(static_cast<unsigned char>(c)); };
+    if (a[i] == b[i]) continue;
+    if (!is_digit(a[i]) || !is_digit(b[i])) return "";
+    differ = true;
+    for (size_t k = i; k < a.size() && is_digit(a[k]); ++k) pattern[k] = '#';
+    for (size_t k = i; k-- > 0 && is_digit(a[k]);) pattern[k] = '#';
+  }
+  return differ ? fmt::format("; if these are frames of a sequence, give '{}'", pattern) : "";
+}
+
 /// "group07" -> ("group", 7); number -1 if there are no trailing digits.
 std::pair<std::string, int> split_number(const std::string& name) {
   size_t digits = name.size();
@@ -189,7 +204,8 @@ void GroupedFile::take_film_facts(const std::string& path, const ExrFile& file, 
   const auto agree = [&](const char* key, std::string& value) {
     const std::string here = attribute(file, std::string("covary:") + key);
     if (files_.size() > 1 && here != value)
-      fail_input(path, fmt::format("{} is '{}', in {} '{}'", key, here, source_.files[0], value));
+      fail_input(path, fmt::format("{} is '{}', in {} '{}'{}", key, here, source_.files[0], value,
+                                   hint_of_frames(path, source_.files[0])));
     value = here;
   };
   agree("sampling", sampling_);

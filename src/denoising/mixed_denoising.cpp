@@ -111,7 +111,9 @@ bool can_be_mixed(const GroupedImage& image) {
 std::string why_unknown(const GroupedImage& image) {
   if (image.groups > 1 || (image.counts && mean_samples(image) < kMinMixedSamples))
     return fmt::format("with fewer than {} samples per pixel denoised images cannot be judged", kMinMixedSamples);
-  if (image.counts) return "with all samples in one group (`groups`) denoised images cannot be judged";
+  if (image.counts)
+    return "all samples are in one group, so that denoised images cannot be judged (2 or more `groups`, or a longer "
+           "`time`)";
   return "one render alone does not tell its noise, which another one of a different seed would";
 }
 

@@ -9,9 +9,7 @@
 #include "core/known_names.h"
 
 namespace covary {
-namespace {
 
-/// Recognises other file types mistaken for a scene; "" if unknown.
 std::string kind_of_file(std::string_view text) {
   if (text.starts_with("v/1\1")) return "an EXR image";
   if (text.starts_with("\x89PNG")) return "a PNG image";
@@ -20,8 +18,6 @@ std::string kind_of_file(std::string_view text) {
   if (first != std::string_view::npos && text[first] == '{') return "JSON";
   return "";
 }
-
-}  // namespace
 
 // ---- XmlDocument ----------------------------------------------------------------------------------------------------
 

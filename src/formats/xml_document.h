@@ -13,6 +13,9 @@
 
 namespace covary {
 
+/// Recognises other file types mistaken for a scene: "an EXR image"; "" if unknown.
+std::string kind_of_file(std::string_view text);
+
 /// A parsed XML file that knows the line and column of its elements.
 class XmlDocument {
  public:

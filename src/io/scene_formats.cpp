@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "formats/xml_document.h"
 #include "gltf/gltf_reader.h"
 #include "pbrt/pbrt_reader.h"
 
@@ -69,6 +70,7 @@ namespace {
 void refuse_other_format(const SceneText& text) {
   const size_t start = text.text.find_first_not_of("\xef\xbb\xbf \t\r\n");
   if (is_scene_file(text.name) || (start != std::string_view::npos && text.text[start] == '<')) return;
+  if (!kind_of_file(text.text).empty()) return;  // what it is is told instead
   throw Error(
       ErrorCode::kInput,
       fmt::format("{}: not a scene that covary reads, which are {} ({}); export it as one of them, e.g. as .glb",

@@ -161,7 +161,8 @@ void PlanRun::plan_time_limit() {
   // No more groups are begun than can be filled if the trials were wrong by a factor of two; but an error, and filters,
   // need some.
   constexpr uint32_t kUseful = 4;
-  const uint32_t fewest = request_.until > 0 ? state_.budget : std::min(plan.samples, kUseful);
+  const bool are_some = kUseful * costs_.sample < 0.6 * left;  // though the end might leave less time
+  const uint32_t fewest = request_.until > 0 ? state_.budget : are_some ? kUseful : std::min(plan.samples, kUseful);
   if (in_rounds() || plan_.groups_follow_speed)
     state_.group_budget = std::max(fewest, std::min(limit, plan.samples / 2));
   if (in_rounds())

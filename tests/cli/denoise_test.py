@@ -479,7 +479,7 @@ class Denoise(RenderTest):
         options = ("--estimator", "none", "--denoise", "error", *PLAIN)
         self.assertIn("fewer than 4 samples per pixel",
                       self.statistics("-o", "a.exr", *options, "--spp", "3")["note"])
-        self.assertIn("with all samples in one group (`groups`) denoised",
+        self.assertIn("all samples are in one group, so that denoised",
                       self.statistics("-o", "c.exr", *options, "--spp", "5", "--groups", "1")["note"])
         facts = self.statistics("-o", "b.exr", *options, "--spp", "4")
         self.assertNotIn("note", facts)
