@@ -117,7 +117,7 @@ ExrFile::~ExrFile() = default;
 ExrFile::ExrFile(const std::string& path, ChecksumPolicy checksums, bool unreadable_too) : path_(path) {
   prepare_exr_library();
   // OpenEXR's own messages do not distinguish a missing file from a damaged one.
-  if (!is_exr(path)) fail_input(path, "not an EXR file");
+  if (!is_exr(path)) fail_input(path, "not an EXR file; `covary convert` makes one of an image in another format");
   check_exr_header(path);
   try {
     handle_ = std::make_unique<Handle>(path);
@@ -220,7 +220,8 @@ void ExrFile::check_channel(const std::string& name, uint32_t crc) const {
 }
 
 void ExrFile::check(std::span<const std::string> channels) const {
-  if (checksums_) checksums_of(channels);
+  const std::set<std::string> each(channels.begin(), channels.end());  // a grey layer names its channel three times
+  if (checksums_) checksums_of(std::vector(each.begin(), each.end()));
 }
 
 std::vector<uint32_t> ExrFile::checksums_of(std::span<const std::string> channels) const {

@@ -279,6 +279,10 @@ class Layers(PicturesTest):
         mean = [(x + y) / 2 for x, y in zip(a["A"], b["A"])]
         spread = [sum((values[i] - 0.5) ** 2 for i in inside) for values in (alpha, mean)]
         self.assertLess(spread[0], 0.5 * spread[1])
+        for name in "ab":  # with checksums
+            self.good("convert", f"{name}.exr", f"own_{name}.exr")
+        self.good("denoise", "own_a.exr", "own_b.exr", *OFF, "-o", "own.exr")
+        self.assertEqual(self.read("own.exr")["A"], alpha)
         self.pair(lambda seed: {**colours("", noisy(seed)), "A": floats([1.0] * N)})
         self.denoise()
         self.assertEqual(self.read()["A"], [1.0] * N)
