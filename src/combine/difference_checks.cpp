@@ -16,6 +16,8 @@ namespace {
 // filters.
 constexpr int kDistance = 6;
 constexpr double kMaxCorrelation = 0.07;
+// Of neighbours: at most 0.01 for a box filter, 0.19 for a tent, 0.25 for Mitsuba's Gaussian.
+constexpr double kMaxOfNeighbours = 0.1;
 constexpr double kMaxExcess = 0.05;  // of the fraction of pixels in which one render is brighter, above one half
 constexpr double kSigmas = 6;
 constexpr double kMostlyBrighter = 0.9;
@@ -38,10 +40,10 @@ double DifferenceChecks::Pair::excess_brighter() const {
 }
 
 /// Correlation of the signs beyond what their mean implies.
-double DifferenceChecks::Pair::correlation() const {
-  if (n == 0) return 0;
+double DifferenceChecks::Pair::correlation(const Signs& signs) const {
+  if (signs.n == 0) return 0;
   const double mean = 2 * excess_brighter();
-  return 2 * static_cast<double>(same_sign) / static_cast<double>(n) - 1 - mean * mean;
+  return 2 * static_cast<double>(signs.same) / static_cast<double>(signs.n) - 1 - mean * mean;
 }
 
 DifferenceChecks::DifferenceChecks(int width, int height, int groups)
@@ -58,9 +60,11 @@ void DifferenceChecks::add_rows(const GroupedImage& image) {
         signs[x] = sign_of_difference(image, x, y, static_cast<int>(t));
         pair.differ += signs[x] != 0;
         pair.brighter += signs[x] > 0;
-        if (x < kDistance || signs[x] == 0 || signs[x - kDistance] == 0) continue;
-        ++pair.n;
-        pair.same_sign += signs[x] == signs[x - kDistance];
+        for (const auto& [distance, of] : {std::pair{kDistance, &pair.far}, {1, &pair.next}}) {
+          if (x < distance || signs[x] == 0 || signs[x - distance] == 0) continue;
+          ++of->n;
+          of->same += signs[x] == signs[x - distance];
+        }
       }
     }
 }
@@ -68,11 +72,11 @@ void DifferenceChecks::add_rows(const GroupedImage& image) {
 void DifferenceChecks::report(const ImageNames& names, std::vector<Finding>& findings) const {
   for (size_t t = 0; t < pairs_.size(); ++t) {
     const Pair& pair = pairs_[t];
-    const double brighter = 0.5 + pair.excess_brighter(), correlation = pair.correlation();
+    const double brighter = 0.5 + pair.excess_brighter(), correlation = pair.correlation(pair.far);
     const double deviation = 0.5 / std::sqrt(static_cast<double>(std::max(1L, pair.differ)));
     const bool is_brighter = brighter - 0.5 > std::max(kMaxExcess, kSigmas * deviation);
     const bool is_correlated =
-        correlation > std::max(kMaxCorrelation, kSigmas / std::sqrt(static_cast<double>(std::max(1L, pair.n))));
+        correlation > std::max(kMaxCorrelation, kSigmas / std::sqrt(static_cast<double>(std::max(1L, pair.far.n))));
     if (is_correlated && brighter < kMostlyBrighter)
       findings.push_back(
           {Finding::Severity::kError,
@@ -93,6 +97,22 @@ void DifferenceChecks::report(const ImageNames& names, std::vector<Finding>& fin
       continue;
     return;  // one such pair is enough
   }
+  warn_of_filter(names, findings);
+}
+
+void DifferenceChecks::warn_of_filter(const ImageNames& names, std::vector<Finding>& findings) const {
+  if (pairs_.empty()) return;
+  const Pair& pair = pairs_[0];
+  const double correlation = pair.correlation(pair.next);
+  const double deviation = 1 / std::sqrt(static_cast<double>(std::max(1L, pair.next.n)));
+  if (correlation <= std::max(kMaxOfNeighbours, kSigmas * deviation)) return;
+  findings.push_back(
+      {Finding::Severity::kWarning,
+       fmt::format("differences of {} and {} are correlated between neighbouring pixels (signs by {:.2f}; noise by 0): "
+                   "the pixel filter is wider than a pixel, which leaves blotches in denoised pictures; render with a "
+                   "box filter: in Mitsuba <rfilter type=\"box\"/>, in pbrt PixelFilter \"box\" \"float xradius\" 0.5 "
+                   "\"float yradius\" 0.5",
+                   names.render(0), names.render(1), correlation)});
 }
 
 }  // namespace covary

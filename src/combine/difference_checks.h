@@ -16,16 +16,21 @@ class DifferenceChecks {
   DifferenceChecks(int width, int height, int groups);
   /// The next rows.
   void add_rows(const GroupedImage& image);
-  /// Appends an error if renders were already denoised, share random numbers, or one is brighter.
+  /// Appends an error if renders were already denoised, share random numbers, or one is brighter, and a warning if
+  /// their pixel filter is wider than a pixel.
   void report(const ImageNames& names, std::vector<Finding>& findings) const;
 
  private:
   struct Pair {  ///< a render and the next
     long differ = 0, brighter = 0;
-    long n = 0, same_sign = 0;  ///< of pixels kDistance apart
+    struct Signs {  ///< of pairs of pixels
+      long n = 0, same = 0;
+    };
+    Signs far, next;  ///< kDistance apart, and side by side
     double excess_brighter() const;
-    double correlation() const;
+    double correlation(const Signs& signs) const;
   };
+  void warn_of_filter(const ImageNames& names, std::vector<Finding>& findings) const;
   std::vector<Pair> pairs_;
   int step_;
 };

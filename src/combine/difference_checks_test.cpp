@@ -56,6 +56,19 @@ TEST(DifferenceChecks, FindsDenoisedRenders) {
   EXPECT_NE(findings(denoised(good(2))).find("they were denoised before"), std::string::npos);
 }
 
+/// Each render filtered by the weights 1, 2, 1 in rows, as a tent does.
+TEST(DifferenceChecks, WarnOfWideFilters) {
+  const test::Grouped sharp = good(2);
+  test::Grouped wide = sharp;
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 1; x + 1 < kWidth; ++x)
+      for (int i = 0; i < 6; ++i)
+        wide.pixel(x, y)[i] = 0.5f * sharp.view().pixel(x, y)[i] +
+                              0.25f * (sharp.view().pixel(x - 1, y)[i] + sharp.view().pixel(x + 1, y)[i]);
+  const std::string text = findings(wide);
+  EXPECT_NE(text.find("the pixel filter is wider than a pixel"), std::string::npos) << text;
+}
+
 TEST(DifferenceChecks, FindsPixelsThatShareRandomNumbers) {
   EXPECT_NE(findings(test::crn_image(kWidth, kHeight, 2, 1)).find("pixels share random numbers"), std::string::npos);
 }
