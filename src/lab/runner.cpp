@@ -14,12 +14,14 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <map>
 #include <sstream>
 #include <utility>
 
 #include "core/error.h"
 #include "core/process.h"
 #include "core/shell_text.h"
+#include "film/image_file.h"
 #include "imageio/output_file.h"
 
 namespace covary::lab {
@@ -40,6 +42,13 @@ std::optional<nlohmann::json> read_json_file(const std::string& path) {
 std::string typed(Words command) {
   command[0] = "covary";
   return shell_text(command);
+}
+
+/// The scene that a render says it is of.
+std::string scene_hash_of(const std::string& render) {
+  const std::map<std::string, std::string> attributes = inspect_image(render).attributes;
+  const auto found = attributes.find(std::string("covary:") + film_key::kSceneHash);
+  return found == attributes.end() ? "" : found->second;
 }
 
 /// Adds the statistics of one of `n` images.
@@ -164,6 +173,15 @@ Runner::Result Runner::render(const Run& run, const SceneInstance& scene, const 
   // An image that missed its target error is still an image.
   constexpr int kTargetMissed = 3;
   if (!process.ok() && process.exit_code != kTargetMissed) return failed(typed_command, process);
+  if (run.frames.empty() && scene.hash.find(scene_hash_of(output)) == std::string::npos) {
+    std::error_code ignored;
+    fs::remove(output, ignored);
+    return {std::nullopt,
+            RunFailure{typed_command, 0,
+                       fmt::format("'{}' has changed since the experiment began; the same command again makes all of "
+                                   "its runs anew",
+                                   scene.file)}};
+  }
   RunRecord record;
   for (const std::string& file : files_of(run.frames, stats)) {
     const std::optional<nlohmann::json> json = read_json_file(file);

@@ -437,6 +437,15 @@ class Programs(ExperimentTest):
         self.results("--program", copy_it.replace("cp ", "cp -p "), env=env)
         self.assertEqual(len(self.runs()), len(before) + 2, "another command, another result")
 
+    def test_a_scene_that_changes_meanwhile_is_told(self):
+        scene = self.path / "room.xml"
+        scene.write_bytes((SCENES / "room.xml").read_bytes())
+        self.suite["scenes"][0]["file"] = str(scene)
+        change_it = 'mine=sed -i s/0.78,/0.77,/ "$COVARY_SCENE"; cp "$COVARY_IMAGE" "$COVARY_OUTPUT"'
+        results = self.results("--program", change_it, code=1)
+        self.assertIn(f"'{scene}' has changed since the experiment began", results["failures"][0]["message"])
+        self.assertTrue(self.results("--program", change_it)["complete"])
+
     def test_a_changed_file_is_another_program(self):
         script = self.path / "mine.sh"
         script.write_text('cp "$COVARY_IMAGE" "$COVARY_OUTPUT"\n')
