@@ -76,7 +76,7 @@ void check_options(const DenoiseCommand& o) {
         usage(fmt::format("'{}' and '{}' are the same file; renders of different seeds are needed", o.inputs[k],
                           o.inputs[i]));
   if (o.inputs.size() > 1 && is_by_network(o))
-    usage("--mode oidn and --clean-features are for one image; covary merge makes one of films");
+    usage("--mode oidn and --clean-features are for one image; `covary merge` makes one of films of covary");
   if (o.target && is_by_network(o))
     usage("--device runs mixtures of denoised images, not Open Image Denoise alone, which has devices of its own");
   if (o.clean_features && !is_by_network(o))

@@ -110,7 +110,7 @@ Denoised denoise_by_network(const DenoiseCommand& o, const DenoiseTask& task, Pr
   const ImageInfo info = inspect_image(input);
   require_memory_of_network(input, info.place.window, o.memory_mib);
   const ColourSpace colours = ImageRows(input, task.layer).colours();
-  FeatureLayers features({o.inputs, task.picture, colours, o.albedo, o.normal, o.no_features});
+  FeatureLayers features({o.inputs, task.picture, colours, o.albedo, o.normal, o.no_features}, false);
   const PlacedImage image = read_image(input, task.layer, ChecksumPolicy::kCheck, std::nullopt);
   warn_of_values(input, image.image);
   if (const std::string by = denoised_by(info.attributes, info.channels, task.layer); !by.empty())
@@ -119,13 +119,14 @@ Denoised denoise_by_network(const DenoiseCommand& o, const DenoiseTask& task, Pr
   progress.begin("denoising");
   Denoiser denoiser(o.denoiser());
   const std::string guided = features.text();
-  const auto taken = [&](const char* name, std::optional<Image>& feature) -> std::shared_ptr<const Image> {
+  const auto taken = [&](const char* name, feature::Index kind) -> std::shared_ptr<const Image> {
+    std::optional<Image> feature = features.take(kind);
     if (!feature) return nullptr;
-    Image own = *std::exchange(feature, std::nullopt);
+    Image own = std::move(*feature);
     return std::make_shared<const Image>(o.clean_features ? denoiser.denoise_feature(name, own) : std::move(own));
   };
-  const std::shared_ptr<const Image> albedo = taken("albedo", features.albedo),
-                                     normal = taken("normal", features.normal);
+  const std::shared_ptr<const Image> albedo = taken("albedo", feature::kAlbedo),
+                                     normal = taken("normal", feature::kNormal);
   const auto denoised = [&](const Image& noisy) { return denoiser.denoise(noisy, albedo, normal, o.clean_features); };
   Denoised result;
   const std::vector<std::string> picture = layer_channels(input, info.channels, task.picture.layer);
@@ -151,7 +152,8 @@ Denoised denoise_by_mixture(const DenoiseCommand& o, const DenoiseTask& task, co
   const DenoisingChoice choice = o.mixing();
   request.estimator = make_default_estimator(false, {}, choice, o.target);
   request.settings.std_error = true;
-  const FeatureLayers features({o.inputs, task.picture, file.colours(), o.albedo, o.normal, o.no_features});
+  FeatureLayers features({o.inputs, task.picture, file.colours(), o.albedo, o.normal, o.no_features},
+                         file.groups() == static_cast<int>(o.inputs.size()));
   request.settings.features = features.view();
   const BeautyLayers layers(o.inputs, task.picture, o.layers, true);
   request.layers = layers.sources();

@@ -115,37 +115,6 @@ std::optional<Image> filled(std::optional<Image> feature) {
   return feature;
 }
 
-void MeanFeature::add(const std::string& path, std::optional<Image> image) {
-  if (!image) return;
-  if (!sum_) sum_ = Image(image->width, image->height, 3), n_.resize(image->data.size() / 3);
-  if (sum_->data.size() != image->data.size() || sum_->width != image->width)
-    throw Error(ErrorCode::kInput, fmt::format("'{}' has {} x {} pixels, others have {} x {}", path, image->width,
-                                               image->height, sum_->width, sum_->height));
-  if (++n_images_ == 2) compare_with_first(*image);
-  for (size_t i = 0; i < n_.size(); ++i) {
-    if (std::isnan(image->data[3 * i])) continue;
-    ++n_[i];
-    for (size_t c = 3 * i; c < 3 * i + 3; ++c) sum_->data[c] += image->data[c];
-  }
-}
-
-void MeanFeature::compare_with_first(const Image& second) {
-  double differences = 0, squares = 0;  // of pixels that both have
-  for (size_t i = 0; i < n_.size(); ++i)
-    for (size_t c = 3 * i; n_[i] == 1 && std::isfinite(second.data[3 * i]) && c < 3 * i + 3; ++c) {
-      const double a = sum_->data[c], b = second.data[c];
-      differences += (a - b) * (a - b), squares += a * a + b * b;
-    }
-  noise_ = squares > 0 ? differences / squares : 0;
-}
-
-std::optional<Image> MeanFeature::mean() const {
-  std::optional<Image> mean = sum_;
-  for (size_t i = 0; i < n_.size(); ++i)
-    for (size_t c = 3 * i; n_[i] > 1 && c < 3 * i + 3; ++c) mean->data[c] /= n_[i];
-  return mean;
-}
-
 FeatureImages read_features(const std::string& path, const ImagePlace& place, const ColourSpace& colours) {
   const ImageInfo info = inspect_image(path);
   const auto own = [&](feature::Index index,
@@ -164,6 +133,8 @@ FeatureImages read_features(const std::string& path, const ImagePlace& place, co
                          find(FeatureKind::kPosition)};
   if (!features.albedo) features.albedo = find(FeatureKind::kAlbedo);
   if (!features.normal) features.normal = find(FeatureKind::kNormal);
+  for (std::optional<Image>* albedo : {&features.albedo, &features.denoising_albedo})
+    if (*albedo) limit_albedo(**albedo);
   if (!features.albedo)
     throw Error(ErrorCode::kInput,
                 fmt::format("--features '{}' has no layer Albedo (Albedo.R, .G, .B) under any known name", path));
@@ -174,42 +145,27 @@ FeatureImages read_features(const std::string& path, const ImagePlace& place, co
   return features;
 }
 
-FeatureLayers::FeatureLayers(const FeatureSearch& search) {
+FeatureLayers::FeatureLayers(const FeatureSearch& search, bool are_groups) {
   if (search.none) return;
-  MeanFeature of_albedo, of_normal, of_position;
+  are_own_ = inspect_image(search.files[0]).attributes.contains(std::string("covary:") + film_key::kSceneHash);
+  features_ = RenderFeatures(are_groups);
   for (const std::string& path : search.files) {
     const ImageInfo info = inspect_image(path);
-    are_own_ = written_by(info.attributes) == Renderer::kCovary;
-    const auto feature = [&](const std::string& name, FeatureKind kind) -> std::optional<Image> {
-      if (name.empty()) return find_feature(path, info, kind, search.colours, search.picture);
-      return named_feature(path, info, kind, search.colours, name);
+    const auto add = [&](feature::Index kind, FeatureKind of_file, const std::string& name) {
+      features_.add(kind, path,
+                    name.empty() ? find_feature(path, info, of_file, search.colours, search.picture)
+                                 : named_feature(path, info, of_file, search.colours, name));
     };
-    of_albedo.add(path, feature(search.albedo, FeatureKind::kAlbedo));
-    of_normal.add(path, feature(search.normal, FeatureKind::kNormal));
-    of_position.add(path, feature("", FeatureKind::kPosition));
+    add(feature::kAlbedo, FeatureKind::kAlbedo, search.albedo);
+    add(feature::kNormal, FeatureKind::kNormal, search.normal);
+    add(feature::kPosition, FeatureKind::kPosition, "");
   }
-  // Of the samples that are the picture's, too; covary's are of others.
-  constexpr double kNoisy = 1e-3;
-  if (!are_own_ && of_albedo.noise() > kNoisy)
-    fmt::print(
-        stderr,
-        "warning: the albedo differs by {:.2g} % from render to render: the predicted error may be too low, as noise "
-        "that features share with the picture passes for detail; more samples, or features rendered apart, help\n",
-        100 * std::sqrt(2 * of_albedo.noise()));
-  albedo = of_albedo.mean(), normal = of_normal.mean(), position = of_position.mean();
-  if (!albedo) normal.reset();  // Open Image Denoise only takes normals together with an albedo
-}
-
-Features FeatureLayers::view() const {
-  const auto or_null = [](const std::optional<Image>& image) { return image ? &*image : nullptr; };
-  return {or_null(albedo), or_null(normal), nullptr, nullptr, or_null(position)};
 }
 
 std::string FeatureLayers::text() const {
-  return normal ? "guided by albedo and normal"
-         : albedo
-             ? "guided by albedo"
-             : std::string("without auxiliary features") + (are_own_ ? ", which `covary render --aovs` writes" : "");
+  if (!features_.has(feature::kAlbedo))
+    return std::string("without auxiliary features") + (are_own_ ? ", which `covary render --aovs` writes" : "");
+  return features_.has(feature::kNormal) ? "guided by albedo and normal" : "guided by albedo";
 }
 
 }  // namespace covary

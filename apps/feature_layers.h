@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "denoising/render_features.h"
 #include "estimators/method.h"
 #include "film/pictures.h"
 
@@ -30,24 +31,6 @@ Image named_feature(const std::string& path, const ImageInfo& info, FeatureKind 
 
 /// The image with 0 in place of NaN.
 std::optional<Image> filled(std::optional<Image> feature);
-
-/// The mean of images, in which pixels that are NaN count as missing; 0 where all are.
-class MeanFeature {
- public:
-  /// Throws Error(kInput), naming the file, if the size differs.
-  void add(const std::string& path, std::optional<Image> image);
-  std::optional<Image> mean() const;
-  /// Half the mean squared difference of the first two images over their mean square; 0 with fewer.
-  double noise() const { return noise_; }
-
- private:
-  void compare_with_first(const Image& second);
-
-  std::optional<Image> sum_;
-  double noise_ = 0;
-  int n_images_ = 0;
-  std::vector<uint16_t> n_;  // of each pixel
-};
 
 /// The layers of --features.
 struct FeatureImages {
@@ -76,16 +59,18 @@ struct FeatureSearch {
   bool none = false;
 };
 
-/// The features of a picture, each the mean over the files that have it.
-struct FeatureLayers {
-  std::optional<Image> albedo, normal, position;
-
-  explicit FeatureLayers(const FeatureSearch& search);
-  Features view() const;
+/// The features of a picture, from the files that have it. `are_groups`: each file is one group of its samples.
+class FeatureLayers {
+ public:
+  FeatureLayers(const FeatureSearch& search, bool are_groups);
+  /// Valid as long as this object lives and stays where it is.
+  Features view() { return features_.view(); }
+  std::optional<Image> take(feature::Index kind) { return features_.take(kind); }
   std::string text() const;
 
  private:
   bool are_own_ = false;  // files of covary
+  RenderFeatures features_;
 };
 
 }  // namespace covary

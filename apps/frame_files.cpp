@@ -115,7 +115,8 @@ void check_frames(const std::vector<int>& frames, const FramePatterns& patterns)
   const size_t more = problems.size() - std::min(problems.size(), kMaxNamed);
   problems.resize(problems.size() - more);
   throw Error(ErrorCode::kInput,
-              fmt::format("{}{}; nothing was written. --resume leaves out frames whose files are missing or unfinished",
+              fmt::format("{}{}; nothing was written. --resume leaves out frames whose files are missing or "
+                          "unfinished, and --frames takes others",
                           fmt::join(problems, "; "),
                           more > 0 ? fmt::format("; and {} more problems of frames", more) : std::string()));
 }

@@ -166,6 +166,21 @@ function = Rule("a function", _function)
 array = Rule("an array", lambda value: value)
 
 
+def _stacked(value: Any) -> Any:
+    """Arrays in a list as one, with their number first."""
+    if not isinstance(value, (list, tuple)) or not value or not all(len(getattr(v, "shape", ())) == 3 for v in value):
+        return value
+    import numpy
+
+    if len({tuple(v.shape) for v in value}) > 1:
+        raise ValueError(f"found arrays of the shapes {', '.join(str(list(v.shape)) for v in value)}")
+    return numpy.stack([numpy.asarray(v) for v in value])
+
+
+#: One array, or a list of arrays [H, W, 3] of renders.
+images = Rule("an array, or a list of arrays of the same shape", _stacked)
+
+
 def choice(names: Iterable[str]) -> Rule:
     """One of these names."""
     known = tuple(names)

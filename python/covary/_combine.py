@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from . import _covary
 from ._arguments import (
-    Rule, array, check_names, check_some, checked, either, empty_or, flag, function, mapping_of, optional, path, text,
-    whole,
+    Rule, array, check_names, check_some, checked, either, empty_or, flag, function, images, mapping_of, optional, path,
+    text, whole,
 )
 from ._images import warn_of_features
 from ._options import DEFAULT, DEFAULT_OF_PAIRS, check_no_passes, declared_rules, text_options
@@ -29,13 +29,13 @@ DENOISE = declared_rules(_covary.combine_options())["denoise"]
 OIDN = empty_or(path)
 PROGRESS = optional(either("a function, True or False", flag, function))
 #: The module checks these together with their pixels.
-IMAGE = Rule("a covary.Film or an array", array.convert)
+IMAGE = Rule("a covary.Film, an array, or a list of arrays of the same shape", images.convert)
 _LAYERS = optional(mapping_of(IMAGE, "a mapping from names to arrays"))
 
 
 @checked(crn=IMAGE, independent=IMAGE, estimator=text, light=IMAGE, counts=array,
-         samples=optional(whole(1, _covary.most_samples)), denoise=DENOISE, albedo=array, normal=array,
-         denoising_albedo=array, denoising_normal=array, position=array, clean_features=flag, layers=_LAYERS,
+         samples=optional(whole(1, _covary.most_samples)), denoise=DENOISE, albedo=images, normal=images,
+         denoising_albedo=images, denoising_normal=images, position=images, clean_features=flag, layers=_LAYERS,
          oidn=OIDN, device=text, std_error=optional(flag), force=flag, progress=PROGRESS)
 def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, light: Film | None = None,
             counts: Any = None, samples: int | None = None, denoise: DenoiseMode | None = None, albedo: Any = None,
@@ -46,10 +46,10 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, l
     """Combines `crn`, whose pixels share their random numbers, and `independent`, whose pixels do not, into one image.
 
     Each is a float32 array [T, H, W, 3], the means of T groups of samples (renders with different seeds), from NumPy,
-    PyTorch or anything with DLPack or the buffer protocol, with any strides; or a Film. Values are linear; 12 groups
-    are recommended. The memory order [H, W, T, 3], as from read_groups() and Film.groups, is read in place; an array of
-    that shape, of more than 64 x 64 pixels, is recognised, with a warning. Without crn
-    (None), `independent` alone is denoised, from two groups on.
+    PyTorch or anything with DLPack or the buffer protocol, with any strides; a list of T arrays; or a Film. Values are
+    linear; 12 groups are recommended. The memory order [H, W, T, 3], as from read_groups() and Film.groups, is read in
+    place; an array of that shape, of more than 64 x 64 pixels, is recognised, with a warning. Without crn (None),
+    `independent` alone is denoised, from two groups on.
 
     estimator: the default mixes denoised images into the combined one where held-out samples prefer them; "iicv" does
         not denoise, and the others are there to compare with. Options follow as keywords (typed in covary.estimators);
@@ -58,13 +58,14 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, l
     counts: samples per pixel of the independent image over all groups, if they vary: whole numbers [H, W]; a Film
         knows its own.
     samples: samples per pixel of the CRN image, for counts, if that is an array, and for estimators that need them.
-        Without crn, of the independent image, over all groups.
+        Without crn, of the independent image, over all groups together; weights are better if it is known.
     denoise: for the least error ("auto", "error"), for little bias ("bias"), balanced, or "none"; by default "auto",
         or "none" if another estimator is named. albedo, normal, position: features [H, W, 3], the others only with the
         albedo; denoising_albedo, denoising_normal: features seen through mirrors and glass (from render():
-        aovs["Albedo"], "N", "P", "DenoisingAlbedo", "DenoisingNormal"); clean_features: they are nearly noise-free, as
-        those of render() are, whose image `films` then give again; oidn: Open Image Denoise's library or its
-        folder, by default searched for; "off": not used.
+        aovs["Albedo"], "N", "P", "DenoisingAlbedo", "DenoisingNormal"). Features of the picture's own samples have
+        noise, which would pass for detail: give those of each render, [T, H, W, 3] or a list. clean_features: they are
+        nearly noise-free, as those of render() are, whose image `films` then give again; oidn: Open Image Denoise's
+        library or its folder, by default searched for; "off": not used.
     layers: parts of `independent` by name, such as direct light, in the same groups: denoised with it, they are in the
         result's aovs, and add up to its image with "Rest".
     device: "cpu"; "auto", the first GPU, and the processor if there is none or it fails; "cuda" or "opencl", or one of

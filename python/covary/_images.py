@@ -31,8 +31,8 @@ def read_image(path: str | PathLike[str], layer: str = "", *, accept_changed: bo
 
 @checked(path=path, image=array, attributes=optional(attribute_texts))
 def write_image(path: str | PathLike[str], image: Any, attributes: dict[str, str] | None = None) -> None:
-    """Writes linear RGB [H, W, 3] in the format of the extension: .exr .pfm .tif .hdr .png .jpg. Raises UsageError
-    for other names."""
+    """Writes linear RGB [H, W, 3] in the format of the extension: .exr .pfm .tif .hdr .png .jpg. A file of
+    that name is replaced. Raises UsageError for other names."""
     make_last_folder(path)
     _covary.write_image(fspath(path), image, attributes or {})
 

@@ -74,6 +74,18 @@ float* large_pages(size_t n) {
   return static_cast<float*>(memory);
 }
 
+/// 0 if unknown.
+int dimensions_of(nb::handle array) { return nb::hasattr(array, "ndim") ? nb::cast<int>(array.attr("ndim")) : 0; }
+
+/// An image whose rows, pixels and channels are so many floats apart.
+Image copied(const float* data, int width, int height, const int64_t* strides) {
+  Image image(width, height, 3);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      for (int c = 0; c < 3; ++c) image.pixel(x, y)[c] = data[y * strides[0] + x * strides[1] + c * strides[2]];
+  return image;
+}
+
 }  // namespace
 
 std::string describe(nb::handle object) {
@@ -131,12 +143,31 @@ GroupedImage Groups::view() {
 
 Image image_of(nb::handle array, const std::string& name, const std::string& shape) {
   const Floats floats = floats_of(array, name, shape);
-  const std::vector<int64_t>& s = floats.strides;
-  Image image(static_cast<int>(floats.shape[1]), static_cast<int>(floats.shape[0]), 3);
+  return copied(floats.data, static_cast<int>(floats.shape[1]), static_cast<int>(floats.shape[0]),
+                floats.strides.data());
+}
+
+Image layer_of(nb::handle array, const std::string& name) {
+  if (dimensions_of(array) != 2) return image_of(array, name);
+  const Floats floats = floats_of(array, name, "H, W");
+  Image image(static_cast<int>(floats.shape[1]), static_cast<int>(floats.shape[0]), 1);
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x)
-      for (int c = 0; c < 3; ++c) image.pixel(x, y)[c] = floats.data[y * s[0] + x * s[1] + c * s[2]];
+      *image.pixel(x, y) = floats.data[y * floats.strides[0] + x * floats.strides[1]];
   return image;
+}
+
+std::vector<Image> images_of(nb::handle array, const std::string& name, int n, const std::string& shape) {
+  std::vector<Image> images;
+  if (dimensions_of(array) != 4) {
+    images.push_back(image_of(array, name, shape));
+    return images;
+  }
+  const Floats floats = floats_of(array, name, fmt::format("{}, {}", n, shape));
+  for (int i = 0; i < n; ++i)
+    images.push_back(copied(floats.data + i * floats.strides[0], static_cast<int>(floats.shape[2]),
+                            static_cast<int>(floats.shape[1]), &floats.strides[1]));
+  return images;
 }
 
 nb::object array_of(Image&& image) {

@@ -57,6 +57,12 @@ class Groups {
 /// A copy of an array [H, W, 3] as an image. Raises like floats_of(); `shape` may name the size that it must have.
 Image image_of(nb::handle array, const std::string& name, const std::string& shape = "H, W, 3");
 
+/// A copy of an array [H, W, 3], or [H, W] with one channel. Raises likewise.
+Image layer_of(nb::handle array, const std::string& name);
+/// Copies of one image [H, W, 3] or of several, [T, H, W, 3] with T = `n`. `shape`: "H, W, 3", with the size that they
+/// must have. Raises likewise.
+std::vector<Image> images_of(nb::handle array, const std::string& name, int n, const std::string& shape);
+
 /// The image's memory as an array [H, W, channels], or [H, W] with one channel; None if the image is empty.
 nb::object array_of(Image&& image);
 /// Adds "predicted_relmse" and "predicted_bounds" (low, high), both None if not known, and "prediction_doubt".

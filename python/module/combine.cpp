@@ -11,6 +11,7 @@
 #include "combine/registry.h"
 #include "core/error.h"
 #include "denoising/mixed_denoising.h"
+#include "denoising/render_features.h"
 #include "film/splat_layer.h"
 #include "gpu/target.h"
 #include "python/module/arrays.h"
@@ -167,6 +168,9 @@ std::vector<std::string> texts_of(const std::vector<Finding>& findings) {
   return texts;
 }
 
+/// The arguments, in the order of feature::Index.
+constexpr const char* kFeatureArguments[] = {"albedo", "normal", "position", "denoising_albedo", "denoising_normal"};
+
 /// `mode`: "": the usual one of the estimator.
 DenoisingChoice denoising_of(const std::string& estimator, const std::string& mode, const std::string& oidn) {
   OptionValues values{{"denoise", mode.empty() ? default_denoising(estimator) : mode}};
@@ -174,42 +178,38 @@ DenoisingChoice denoising_of(const std::string& estimator, const std::string& mo
   return settings_from<DenoisingChoice>(values);
 }
 
-/// The features of --denoise.
-struct FeatureImages {
-  Image albedo, normal, denoising_albedo, denoising_normal, position;
-  bool clean;
-  FeatureImages(const ExtraInputs& beside, const Method& estimator, const Input& image) : clean(beside.clean_features) {
-    const std::string shape = fmt::format("{}, {}, 3", image.height(), image.width());
-    const auto take = [&](nb::handle array, const char* name, Image& to) {
-      if (array.is_none()) return;
-      if (!estimator.reads_features)
-        throw Error(ErrorCode::kUsage, std::string(name) +
-                                           ": auxiliary features are for denoising, with denoise='auto', "
-                                           "'bias', 'balanced' or 'error'");
-      to = image_of(array, name, shape);
-    };
-    take(beside.albedo, "albedo", albedo);
-    take(beside.normal, "normal", normal);
-    take(beside.denoising_albedo, "denoising_albedo", denoising_albedo);
-    take(beside.denoising_normal, "denoising_normal", denoising_normal);
-    take(beside.position, "position", position);
-    const auto needs = [](const Image& feature, const Image& other, const char* name, const char* other_name) {
-      if (feature.data.empty() || !other.data.empty()) return;
-      throw Error(ErrorCode::kUsage, fmt::format("{}: it has an effect only together with {}", name, other_name));
-    };
-    needs(normal, albedo, "normal", "the albedo");
-    needs(position, albedo, "position", "the albedo");
-    needs(denoising_normal, denoising_albedo, "denoising_normal", "denoising_albedo");
-    if (!normal.data.empty()) needs(denoising_albedo, denoising_normal, "denoising_albedo", "denoising_normal");
-    if (clean && albedo.data.empty() && denoising_albedo.data.empty())
-      throw Error(ErrorCode::kUsage, "clean_features: it has an effect only together with the albedo");
+/// The features of --denoise: of all renders, or [T, H, W, 3] of each.
+RenderFeatures features_from(const ExtraInputs& beside, const Method& estimator, const Input& image) {
+  const std::string shape = fmt::format("{}, {}, 3", image.height(), image.width());
+  const std::pair<const nb::object&, feature::Index> arrays[] = {{beside.albedo, feature::kAlbedo},
+                                                                 {beside.normal, feature::kNormal},
+                                                                 {beside.position, feature::kPosition},
+                                                                 {beside.denoising_albedo, feature::kDenoisingAlbedo},
+                                                                 {beside.denoising_normal, feature::kDenoisingNormal}};
+  RenderFeatures features;
+  for (const auto& [array, kind] : arrays) {
+    if (array.is_none()) continue;
+    const std::string name = kFeatureArguments[kind];
+    if (!estimator.reads_features)
+      throw Error(ErrorCode::kUsage, name +
+                                         ": auxiliary features are for denoising, with denoise='auto', 'bias', "
+                                         "'balanced' or 'error'");
+    for (Image& of_render : images_of(array, name, image.groups(), shape))
+      features.add(kind, name, std::move(of_render));
   }
-  Features view() const {
-    const auto or_null = [](const Image& image) { return image.data.empty() ? nullptr : &image; };
-    return {or_null(albedo),           or_null(normal),   or_null(denoising_albedo),
-            or_null(denoising_normal), or_null(position), clean};
-  }
-};
+  const auto needs = [&](feature::Index kind, feature::Index other, const char* other_name) {
+    if (!features.has(kind) || features.has(other)) return;
+    throw Error(ErrorCode::kUsage,
+                fmt::format("{}: it has an effect only together with {}", kFeatureArguments[kind], other_name));
+  };
+  needs(feature::kNormal, feature::kAlbedo, "the albedo");
+  needs(feature::kPosition, feature::kAlbedo, "the albedo");
+  needs(feature::kDenoisingNormal, feature::kDenoisingAlbedo, "denoising_albedo");
+  if (features.has(feature::kNormal)) needs(feature::kDenoisingAlbedo, feature::kDenoisingNormal, "denoising_normal");
+  if (beside.clean_features && !features.has(feature::kAlbedo) && !features.has(feature::kDenoisingAlbedo))
+    throw Error(ErrorCode::kUsage, "clean_features: it has an effect only together with the albedo");
+  return features;
+}
 
 const Film* film_of(nb::handle light) {
   Film* film = nullptr;
@@ -225,13 +225,14 @@ Method estimator_of(bool is_pair, const std::string& name, const OptionValues& o
   if (name == kDefaultEstimator && (is_pair || denoising.denoises()))
     return make_default_estimator(is_pair, options, denoising, target);
   if (is_pair) return with_denoising(make_pair_estimator(name, options, target), denoising, target);
-  if (name != kDefaultEstimator && name != kNoEstimator)
+  if (name != kDefaultEstimator && name != kNoEstimator) {
+    make_pair_estimator(name, options);  // refuses unknown names
     throw Error(ErrorCode::kUsage,
                 fmt::format("crn: found None; '{}' needs the image with common random numbers", name));
+  }
   if (!denoising.denoises())
     throw Error(ErrorCode::kUsage,
-                std::string("crn: found None; without it, independent images can only be denoised, ") + kNotDenoised +
-                    " they are not");
+                "denoise: found 'none'; without crn, images are only denoised: 'auto', 'bias', 'balanced' or 'error'");
   return with_denoising(make_estimator(kNoEstimator, options), denoising);
 }
 
@@ -248,8 +249,9 @@ nb::dict combine(nb::object crn, nb::object independent, const ExtraInputs& besi
   request.settings =
       pair_settings(estimator, needs_sample_count(estimator) || !has_counts ? arguments.samples : std::nullopt,
                     pair.crn_samples(), arguments.std_error.value_or(estimator.predicts_error));
-  const FeatureImages features(beside, estimator, pair.independent);
+  RenderFeatures features = features_from(beside, estimator, pair.independent);
   request.settings.features = features.view();
+  request.settings.features.clean = beside.clean_features;
   pair.take_layers(beside.layers);
   if (has_counts) pair.take_counts(nb::cast<Counts>(beside.counts), arguments.samples);
   request.force = arguments.force;

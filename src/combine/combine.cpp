@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <utility>
@@ -143,9 +144,8 @@ double memory_of_rows(const CombineRequest& request, int rows) {
   const double values = kImage * all_groups + 2 * kCount;
   const Features& features = request.settings.features;
   double n_features = 0;
-  for (const Image* guide :
-       {features.albedo, features.normal, features.denoising_albedo, features.denoising_normal, features.position})
-    n_features += guide != nullptr;
+  for (const Image* Features::*const image : kImagesOfFeatures) n_features += features.*image != nullptr;
+  if (features.halves[0]) n_features *= 3;
   const bool in_bands = rows < request.independent.height;
   // For bands: the estimate of the whole image; its standard error and bias are stored beside them.
   const double of_whole = n_features * kImage + (in_bands ? 3 * kImage + request.estimator.memory.of_whole : 0);
@@ -243,6 +243,21 @@ void report(const std::vector<StrayValue>& strays, const ImageNames& names, std:
                                   s.brightness, s.x, s.y, names.render(static_cast<size_t>(s.group)))});
 }
 
+/// The source with its known number of samples in each pixel, where rows do not tell it.
+GroupedSource with_counts(const GroupedSource& source) {
+  if (source.samples <= 0) return source;
+  GroupedSource result = source;
+  result.rows = [source, counts = std::make_shared<std::vector<uint32_t>>()](int first, int n) {
+    GroupedImage image = source.rows(first, n);
+    if (image.counts) return image;
+    counts->assign(static_cast<size_t>(image.width) * image.height,
+                   static_cast<uint32_t>(std::llround(source.samples)));
+    image.counts = counts->data(), image.mean_count = source.samples;
+    return image;
+  };
+  return result;
+}
+
 /// The source with these values set to NaN.
 GroupedSource without(const GroupedSource& source, const std::vector<StrayValue>& strays) {
   if (strays.empty()) return source;
@@ -318,9 +333,11 @@ EstimatorResult finish(MethodImage image, const GroupedImage* light) {
   return result;
 }
 
-CombinedImage combine(const CombineRequest& given) {
-  if (given.estimator.name.empty())
+CombinedImage combine(const CombineRequest& asked) {
+  if (asked.estimator.name.empty())
     throw Error(ErrorCode::kUsage, "no `estimator`; make_default_estimator() and make_estimator() make one");
+  CombineRequest given = asked;
+  if (!given.crn) given.independent = with_counts(given.independent);
   CombinedImage combined;
   combined.planned_memory = planned_memory(given);
   check_memory(given, combined.planned_memory);

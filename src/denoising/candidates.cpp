@@ -19,6 +19,8 @@ namespace {
 
 /// The smallest albedo to divide by.
 constexpr float kMinAlbedo = 0.02f;
+/// In feature_of_light(): the albedo of a pixel that reflects nothing, and its feature.
+constexpr float kBlackAlbedo = 0.004f, kFarFromNormals = 1000;
 
 /// Copies an image's channels, divided by `unit`, to the planes from index `first` on.
 void copy_feature(const Image& image, float unit, int first, Planes& planes) {
@@ -36,7 +38,7 @@ Image combined(const Image& a, const Image& b, const Operation& operation) {
 }
 
 struct FilterFeatures : RegressionFeatures {
-  Planes all, normal;
+  Planes all, of_light;
   Image albedo;  // at least kMinAlbedo; empty where there is none
   WantedRows wanted;
 };
@@ -51,10 +53,10 @@ FilterFeatures filter_features(const Features& features, FilterKinds kinds) {
   copy_feature(*features.albedo, kAlbedoUnit, 0, result.all);
   result.albedo = *features.albedo;
   for (float& value : result.albedo.data) value = std::max(value, kMinAlbedo);
+  result.of_light = planes(*features.albedo, 3);
+  copy_feature(feature_of_light(features), kNormalUnit, 0, result.of_light);
   if (!features.normal) return result;
-  result.normal = planes(*features.normal, 3);
   copy_feature(*features.normal, kNormalUnit, 3, result.all);
-  copy_feature(*features.normal, kNormalUnit, 0, result.normal);
   return result;
 }
 
@@ -94,7 +96,7 @@ std::vector<std::vector<Image>> filtered(const FilterFeatures& features, Candida
     const Image& error = demodulated.emplace_back(combined(*in.std_error, features.albedo, std::divides<>()));
     steerings.push_back({&image, &error, {{kSharpBandwidth, {&image}}}});
   }
-  images = nl_means(steerings, or_null(features.normal), *inputs[0].valid, features.wanted);
+  images = nl_means(steerings, or_null(features.of_light), *inputs[0].valid, features.wanted);
   demodulated.clear(), steerings.clear();
   for (size_t i = 0; i < all.size(); ++i) {
     all[i].push_back(combined(images[i], features.albedo, std::multiplies<>()));
@@ -127,7 +129,7 @@ std::vector<std::vector<Image>> filtered_layers(const FilterFeatures& features, 
   for (const Image& layer : layers)
     without_albedo.push_back(&demodulated.emplace_back(combined(layer, features.albedo, std::divides<>())));
   steerings = {{&demodulated[0], &demodulated[1], {{kSharpBandwidth, without_albedo}}}};
-  images = nl_means(steerings, or_null(features.normal), *in.valid, features.wanted);
+  images = nl_means(steerings, or_null(features.of_light), *in.valid, features.wanted);
   for (Image& image : images) image = combined(image, features.albedo, std::multiplies<>());
   all.push_back(std::move(images));
   if (!features.features.empty()) all.insert(all.begin(), regressed(features, in, sources, all.back()));
@@ -137,7 +139,25 @@ std::vector<std::vector<Image>> filtered_layers(const FilterFeatures& features, 
 /// Open Image Denoise with features that it prefilters unless they are clean.
 class NetworkWithFeatures {
  public:
-  NetworkWithFeatures(const Features& features, const DenoiseOptions& options) : denoiser_(options) {
+  NetworkWithFeatures(const Features& features, const DenoiseOptions& options)
+      : denoiser_(options), features_(features) {}
+
+  int runs() const { return denoiser_.runs(); }
+  /// `image`: of all samples or a half (CandidateInput::part), already mirrored.
+  Image denoise(Image image, Mirror mirror = Mirror::kNone, int part = 0) {
+    prepare_features(part);
+    const auto turned = [&](const std::shared_ptr<const Image>& feature) {
+      return feature && mirror != Mirror::kNone ? std::make_shared<const Image>(mirrored(*feature, mirror)) : feature;
+    };
+    return denoiser_.denoise(std::move(image), turned(albedo_), turned(normal_), true);
+  }
+
+ private:
+  void prepare_features(int part) {
+    const Features& wanted = features_.of_part(part);
+    if (std::exchange(prepared_, &wanted) == &wanted) return;
+    albedo_.reset(), normal_.reset();
+    const Features features = network_features(wanted);
     if (!features.albedo) return;
     const auto clean = [&](const char* name, const Image& feature) {
       return std::make_shared<const Image>(features.clean ? feature : denoiser_.denoise_feature(name, feature));
@@ -146,22 +166,15 @@ class NetworkWithFeatures {
     if (features.normal) normal_ = clean("normal", *features.normal);
   }
 
-  int runs() const { return denoiser_.runs(); }
-  /// `image` is already mirrored.
-  Image denoise(Image image, Mirror mirror = Mirror::kNone) {
-    const auto turned = [&](const std::shared_ptr<const Image>& feature) {
-      return feature && mirror != Mirror::kNone ? std::make_shared<const Image>(mirrored(*feature, mirror)) : feature;
-    };
-    return denoiser_.denoise(std::move(image), turned(albedo_), turned(normal_), true);
-  }
-
- private:
   Denoiser denoiser_;
+  const Features features_;
+  const Features* prepared_ = nullptr;  // the features that those below were made of
   std::shared_ptr<const Image> albedo_, normal_;
 };
 
 void denoise_all(NetworkWithFeatures& network, std::span<Image> images) {
-  denoise_with_halves(images, [&](Image image, Mirror mirror) { return network.denoise(std::move(image), mirror); });
+  denoise_with_halves(
+      images, [&](Image image, Mirror mirror, int part) { return network.denoise(std::move(image), mirror, part); });
 }
 
 /// The network's images as candidates; `with_residual`: also with residual correction in two widths.
@@ -186,6 +199,15 @@ CandidateMaker::Make one_by_one(std::function<std::vector<Image>(const Candidate
     for (const CandidateInput& in : inputs) all.push_back(make(in));
     return all;
   };
+}
+
+Image feature_of_light(const Features& features) {
+  const Image& albedo = *features.albedo;
+  Image marked = features.normal ? *features.normal : Image(albedo.width, albedo.height, 3);
+  for (size_t i = 0; i < albedo.data.size(); i += 3)
+    if (std::max({albedo.data[i], albedo.data[i + 1], albedo.data[i + 2]}) < kBlackAlbedo)
+      std::fill_n(&marked.data[i], 3, kFarFromNormals);
+  return marked;
 }
 
 RegressionFeatures regression_features(const Features& features, FilterKinds kinds) {
@@ -220,7 +242,16 @@ CandidateMaker filtered_candidates(const Features& features, CandidateBase base,
   kept->wanted = wanted;
   CandidateMaker maker;
   maker.names = filter_names(features, base, kinds);
-  maker.make = [kept, base](std::span<const CandidateInput> inputs) { return filtered(*kept, base, inputs); };
+  maker.make = [kept, features, base, kinds](std::span<const CandidateInput> inputs) {
+    if (!features.halves[0]) return filtered(*kept, base, inputs);
+    std::vector<std::vector<Image>> all;
+    for (const CandidateInput& in : inputs) {
+      FilterFeatures own = filter_features(features.of_part(in.part), kinds);
+      own.wanted = kept->wanted;
+      all.push_back(std::move(filtered(own, base, {&in, 1})[0]));
+    }
+    return all;
+  };
   maker.make_layers = [kept](const CandidateInput& input, std::span<const Image> layers) {
     return filtered_layers(*kept, input, layers);
   };
@@ -243,6 +274,13 @@ void check_features(const Features& features, int width, int height) {
   }
   if (features.normal && !features.albedo)
     throw Error(ErrorCode::kInput, "a normal without an albedo is not used; give both");
+  for (const Features* half : features.halves) {
+    if (!half) continue;
+    check_features(*half, width, height);
+    for (const Image* Features::*const image : kImagesOfFeatures)
+      if (!(half->*image) != !(features.*image))
+        throw Error(ErrorCode::kInput, "the features of a half of the samples are other ones than those of all");
+  }
 }
 
 Features network_features(const Features& features) {
@@ -253,7 +291,7 @@ Features network_features(const Features& features) {
 
 NetworkCalls network_calls(const Features& features, const DenoiseOptions& options) {
   const auto kept = std::make_shared<std::optional<NetworkWithFeatures>>();
-  const auto network = [kept, features = network_features(features), options]() -> NetworkWithFeatures& {
+  const auto network = [kept, features, options]() -> NetworkWithFeatures& {
     return *kept ? **kept : kept->emplace(features, options);
   };
   return {.images =
@@ -288,7 +326,7 @@ CandidateMaker neural_candidates(const Features& features, const DenoiseOptions&
     });
     return maker;
   }
-  const auto network = std::make_shared<NetworkWithFeatures>(network_features(features), options);
+  const auto network = std::make_shared<NetworkWithFeatures>(features, options);
   maker.runs = [network] { return network->runs(); };
   maker.make = [network, base](std::span<const CandidateInput> inputs) {
     std::vector<Image> clean;

@@ -85,6 +85,10 @@ struct RegressionFeatures {
   bool nl_means = true;             ///< whether NL-means filters the image itself, too
 };
 RegressionFeatures regression_features(const Features& features, FilterKinds kinds);
+/// The feature of the image divided by albedo: the normal, if there is one, but for pixels that reflect nothing, such
+/// as lamps. Divided by their albedo, they would outshine the surfaces beside them, so they are compared with each
+/// other alone.
+Image feature_of_light(const Features& features);
 /// The names of filtered_candidates(), in order.
 std::vector<std::string> filter_names(const Features& features, CandidateBase base, FilterKinds kinds);
 /// Candidates without a network. The features must outlive the result. Rows of a larger image begin at a multiple of

@@ -24,11 +24,13 @@ Image mirrored(Image image, Mirror mirror) {
   return image;
 }
 
-void denoise_with_halves(std::span<Image> images, const std::function<Image(Image image, Mirror mirror)>& denoise) {
+void denoise_with_halves(std::span<Image> images,
+                         const std::function<Image(Image image, Mirror mirror, int part)>& denoise) {
   constexpr Mirror kMirrors[] = {Mirror::kNone, Mirror::kColumns, Mirror::kRows};
   COVARY_CHECK(images.size() == 1 || images.size() == 3, "all samples, or these and both halves");
-  for (size_t i = 0; i < images.size(); ++i)
-    images[i] = mirrored(denoise(mirrored(std::move(images[i]), kMirrors[i]), kMirrors[i]), kMirrors[i]);
+  for (size_t i = images.size(); i-- > 0;)
+    images[i] =
+        mirrored(denoise(mirrored(std::move(images[i]), kMirrors[i]), kMirrors[i], static_cast<int>(i)), kMirrors[i]);
   if (images.size() == 1) return;
   std::vector<float>& whole = images[0].data;
   for (size_t i = 0; i < whole.size(); ++i)

@@ -20,8 +20,10 @@ namespace covary {
 enum class Mirror { kNone, kColumns, kRows };
 Image mirrored(Image image, Mirror mirror);
 
-/// `denoise(image, mirror)` denoises a mirrored image. `images`: all samples, or all samples and both halves; receives
-/// the results, in the original order of pixels. The first is the average above if there are halves.
-void denoise_with_halves(std::span<Image> images, const std::function<Image(Image image, Mirror mirror)>& denoise);
+/// `denoise(image, mirror, part)` denoises a mirrored image, of all samples (0), which come last, or a half (1, 2).
+/// `images`: all samples, or all samples and both halves; receives the results, in the original order of pixels. The
+/// first is the average above if there are halves.
+void denoise_with_halves(std::span<Image> images,
+                         const std::function<Image(Image image, Mirror mirror, int part)>& denoise);
 
 }  // namespace covary

@@ -17,7 +17,7 @@ Image constant(float value) {
 }
 
 /// A denoiser with an error of 4 in the first column and of 8 in the first row of the image it is given.
-Image wrong_at_the_edges(Image result, Mirror) {
+Image wrong_at_the_edges(Image result, Mirror, int) {
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x)
       for (int c = 0; c < 3; ++c) result.pixel(x, y)[c] += (x == 0 ? 4.0f : 0.0f) + (y == 0 ? 8.0f : 0.0f);
@@ -52,7 +52,7 @@ TEST(MirroredHalves, LeavesASingleImageAsItIsDenoised) {
   const Image whole = constant(2);
   std::array<Image, 1> results = {whole};
   denoise_with_halves(results, wrong_at_the_edges);
-  EXPECT_EQ(results[0].data, wrong_at_the_edges(whole, Mirror::kNone).data);
+  EXPECT_EQ(results[0].data, wrong_at_the_edges(whole, Mirror::kNone, 0).data);
 }
 
 }  // namespace

@@ -48,8 +48,8 @@ std::vector<Image> layers_of(const DenoisingParts& parts, const std::vector<Cand
                              const MixedDenoising& mixture, std::span<const Layer> layers) {
   if (layers.empty()) return {};
   const Image h = mean_image(parts.whole.independent);
-  return denoise_layers({&mixture.result.estimate, &parts.groups, layers, input_of(parts.whole, h, parts.valid), makers,
-                         mixture.weights, &mixture.shares});
+  return denoise_layers({&mixture.result.estimate, &parts.groups, layers, input_of(parts.whole, h, parts.valid, 0),
+                         makers, mixture.weights, &mixture.shares});
 }
 
 int runs_of(const std::vector<CandidateMaker>& makers) {

@@ -118,17 +118,17 @@ bool has_network(const std::vector<CandidateMaker>& makers) {
   return std::any_of(makers.begin(), makers.end(), [](const CandidateMaker& m) { return m.network; });
 }
 
-CandidateInput input_of(const DenoisingPart& part, const Image& h, const std::vector<unsigned char>& valid) {
+CandidateInput input_of(const DenoisingPart& part, const Image& h, const std::vector<unsigned char>& valid, int index) {
   if (const auto& limited = part.limited)
-    return {&limited->estimate, &limited->std_error, &h, &limited->independent, &valid};
-  return {&part.image.estimate, &part.image.std_error, &h, &part.independent, &valid};
+    return {&limited->estimate, &limited->std_error, &h, &limited->independent, &valid, index};
+  return {&part.image.estimate, &part.image.std_error, &h, &part.independent, &valid, index};
 }
 
 std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>& parts,
                                         const std::vector<unsigned char>& valid,
                                         const std::vector<CandidateMaker>& makers, int first) {
   std::vector<CandidateSet> sets = made_candidates(parts, valid, makers, first);
-  add_weighed(parts, valid, makers, sets);
+  add_weighed(parts, valid, makers, first, sets);
   return sets;
 }
 
@@ -140,8 +140,7 @@ std::vector<CandidateSet> made_candidates(const std::vector<const DenoisingPart*
   std::vector<CandidateSet> sets;
   for (const DenoisingPart* part : parts) {
     h.push_back(mean_image(part->independent));
-    inputs.push_back(input_of(*part, h.back(), valid));
-    inputs.back().part = first + static_cast<int>(sets.size());
+    inputs.push_back(input_of(*part, h.back(), valid, first + static_cast<int>(sets.size())));
     sets.push_back({part->image.estimate, {}});
   }
   for (const CandidateMaker& maker : makers) {
@@ -156,10 +155,10 @@ std::vector<CandidateSet> made_candidates(const std::vector<const DenoisingPart*
 }
 
 void add_weighed(const std::vector<const DenoisingPart*>& parts, const std::vector<unsigned char>& valid,
-                 const std::vector<CandidateMaker>& makers, std::vector<CandidateSet>& sets) {
+                 const std::vector<CandidateMaker>& makers, int first, std::vector<CandidateSet>& sets) {
   for (const CandidateMaker& maker : makers)
     for (size_t i = 0; maker.shares && i < sets.size(); ++i)
-      add_weighed(maker, input_of(*parts[i], parts[i]->image.estimate, valid), sets[i]);
+      add_weighed(maker, input_of(*parts[i], parts[i]->image.estimate, valid, first + static_cast<int>(i)), sets[i]);
 }
 
 namespace {

@@ -27,8 +27,9 @@ struct MixedParts {
   Mixture mixture;
 };
 
-/// The input for candidates of a part. `h`: mean of its independent image. The arguments must outlive the result.
-CandidateInput input_of(const DenoisingPart& part, const Image& h, const std::vector<unsigned char>& valid);
+/// The input for candidates of a part. `h`: mean of its independent image. `index`: CandidateInput::part. The other
+/// arguments must outlive the result.
+CandidateInput input_of(const DenoisingPart& part, const Image& h, const std::vector<unsigned char>& valid, int index);
 
 /// Each part's image and candidates. The parts are all samples, both halves, or all of these; `first`: 1 for the
 /// halves.
@@ -41,7 +42,7 @@ std::vector<CandidateSet> made_candidates(const std::vector<const DenoisingPart*
                                           const std::vector<unsigned char>& valid,
                                           const std::vector<CandidateMaker>& makers, int first = 0);
 void add_weighed(const std::vector<const DenoisingPart*>& parts, const std::vector<unsigned char>& valid,
-                 const std::vector<CandidateMaker>& makers, std::vector<CandidateSet>& sets);
+                 const std::vector<CandidateMaker>& makers, int first, std::vector<CandidateSet>& sets);
 
 /// The first candidate, an image with little noise.
 inline const Image& guide_of(const CandidateSet& set) { return set.candidates[0]; }

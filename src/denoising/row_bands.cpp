@@ -40,6 +40,11 @@ FeatureRows::FeatureRows(const Features& whole, int first, int n) {
     if (const Image* image = whole.*kImagesOfFeatures[i])
       images[i] = rows_of(*image, first, n), features.*kImagesOfFeatures[i] = &images[i];
   features.clean = whole.clean;
+  for (size_t half = 0; half < halves.size(); ++half)
+    if (whole.halves[half]) {
+      halves[half] = std::make_unique<FeatureRows>(*whole.halves[half], first, n);
+      features.halves[half] = &halves[half]->features;
+    }
 }
 
 }  // namespace covary

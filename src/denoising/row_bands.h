@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <vector>
 
 #include "denoising/candidates.h"
@@ -38,6 +39,7 @@ int mixed_halo(CandidateBase base, bool with_network, int halo_of_parts, const P
 /// Rows of auxiliary images.
 struct FeatureRows {
   std::array<Image, feature::kCount> images;
+  std::array<std::unique_ptr<FeatureRows>, 2> halves;
   Features features;
 
   FeatureRows(const Features& whole, int first, int n);

@@ -33,12 +33,15 @@ TEST(RowBands, HoldRowsOfFeatures) {
   Features whole;
   whole.albedo = &albedo;
   whole.clean = true;
+  const Features half = whole;
+  whole.halves = {&half, &half};
   const FeatureRows rows(whole, 4, 3);
   ASSERT_TRUE(rows.features.albedo);
   EXPECT_EQ(rows.features.albedo->height, 3);
   EXPECT_EQ(rows.features.albedo->pixel(1, 1)[2], 5);
   EXPECT_FALSE(rows.features.normal);
   EXPECT_TRUE(rows.features.clean);
+  EXPECT_EQ(rows.features.of_part(2).albedo->data, rows.features.albedo->data);
 }
 
 }  // namespace

@@ -38,7 +38,7 @@ struct MadeRows {
   }
   /// Adds the candidates that consist of others.
   void weigh() {
-    add_weighed(parts_of_sets(), parts.valid, makers, sets);
+    add_weighed(parts_of_sets(), parts.valid, makers, sets.size() == 2 ? 1 : 0, sets);
     features.reset();
   }
 };

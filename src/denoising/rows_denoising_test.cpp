@@ -19,7 +19,8 @@ constexpr int kWidth = 30;
 struct Scene {
   int height;
   test::Grouped crn, independent;
-  Image albedo, normal, position;
+  Image albedo, normal, position, other_albedo;
+  std::array<Features, 2> halves;  // none unless set
 
   Scene(int rows, int groups)
       : height(rows),
@@ -35,6 +36,8 @@ struct Scene {
           normal.pixel(x, y)[c] = c == (y / 25) % 3;
           position.pixel(x, y)[c] = static_cast<float>(c == 0 ? x : y);
         }
+    other_albedo = albedo;
+    for (float& value : other_albedo.data) value += 0.1f;
     for (const int y : {0, 100, 200})  // left out
       independent.pixel(9, y)[4] = std::numeric_limits<float>::quiet_NaN();
   }
@@ -43,7 +46,13 @@ struct Scene {
     MethodSettings settings;
     settings.std_error = true;
     if (with_features) settings.features = {&albedo, &normal, nullptr, nullptr, &position};
+    if (halves[0].albedo) settings.features.halves = {&halves[0], &halves[1]};
     return settings;
+  }
+  /// Gives each half features of its own.
+  void set_halves() {
+    halves[0] = halves[1] = {&albedo, &normal, nullptr, nullptr, &position};
+    halves[1].albedo = &other_albedo;
   }
 };
 
@@ -100,6 +109,20 @@ TEST(RowsDenoising, OfAMeanHaveTheBitsOfTheWhole) {
     check(estimator, scene, false, spare, "without features");
     check(estimator, scene, true, spare, "with features");
   }
+}
+
+TEST(RowsDenoising, WithFeaturesOfEachHalfHaveTheBitsOfTheWhole) {
+  Scene scene(451, 4);
+  const MethodImage before =
+      denoiser("none", DenoiseMode::kAuto).image({{}, scene.independent.view()}, scene.settings(true));
+  scene.set_halves();
+  EXPECT_NE(
+      denoiser("none", DenoiseMode::kAuto).image({{}, scene.independent.view()}, scene.settings(true)).std_error.data,
+      before.std_error.data);
+  check(denoiser("none", DenoiseMode::kAuto), scene, true, 60, "a mean");
+  Scene of_pair(601, 6);
+  of_pair.set_halves();
+  check(denoiser("iicv", DenoiseMode::kAuto), of_pair, true, 60, "a pair");
 }
 
 TEST(RowsDenoising, OfAMeanOfUnequalSamplesHaveTheBitsOfTheWhole) {

@@ -5,19 +5,23 @@
 #include "weighing/weighing.h"
 
 namespace covary {
+namespace {
+
+WeighingSurfaces surfaces_of(const Features& features) {
+  if (!features.albedo || !features.normal) return {};
+  const Features second = network_features(features);
+  return {features.albedo, features.normal, second.albedo, second.normal};
+}
+
+}  // namespace
 
 void add_weighing_maker(const Features& features, std::vector<CandidateMaker>& makers) {
   const WeighingNetwork* const network = WeighingNetwork::find(names_of(makers));
   if (!network) return;
-  WeighingSurfaces seen;
-  if (features.albedo && features.normal) {
-    const Features second = network_features(features);
-    seen = {features.albedo, features.normal, second.albedo, second.normal};
-  }
   CandidateMaker maker;
   maker.names = {kWeighedName};
-  maker.shares = [network, seen](const CandidateInput& in, const CandidateSet& set) {
-    return network->shares({&set.base, set.candidates, in.std_error, seen});
+  maker.shares = [network, features](const CandidateInput& in, const CandidateSet& set) {
+    return network->shares({&set.base, set.candidates, in.std_error, surfaces_of(features.of_part(in.part))});
   };
   makers.push_back(std::move(maker));
 }

@@ -33,6 +33,12 @@ struct Features {
   const Image* denoising_normal = nullptr;
   const Image* position = nullptr;  ///< of the first surface, in any unit
   bool clean = false;               ///< nearly noise-free, so that a network need not prefilter them
+  /// The same images of the halves of the samples, the first, third, … groups and the others; null: those above. Where
+  /// features have noise of the picture's own samples, their mean brings the noise of one half to the other's images.
+  std::array<const Features*, 2> halves = {};
+
+  /// Those for all samples (0) or a half of them (1, 2).
+  const Features& of_part(int part) const { return part > 0 && halves[part - 1] ? *halves[part - 1] : *this; }
 };
 
 /// The images of Features, in the order of kAuxiliaryFeatures.

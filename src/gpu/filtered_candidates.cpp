@@ -30,6 +30,7 @@ FeatureBuffers::FeatureBuffers(Device& device, const Features& features, FilterK
       normal_(uploaded(device, features.normal)),
       albedo_behind_(uploaded(device, features.denoising_albedo)),
       normal_behind_(uploaded(device, features.denoising_normal)) {
+  if (features.albedo) of_light_ = device.upload(std::span<const float>(feature_of_light(features).data));
   const RegressionFeatures regression = regression_features(features, kinds);
   nl_means_ = regression.nl_means;
   if (regression.features.empty()) return;
@@ -71,7 +72,7 @@ void filter(Device& device, const Groups& groups, const FeatureBuffers& features
   const Buffer<float> source = layer ? demodulated(device, *layer, *features.albedo()) : Buffer<float>();
   input.image = &image, input.std_error = &error, input.source = or_null(source);
   input.features.clear();
-  if (features.normal()) input.features.push_back({features.normal(), kNormalUnit});
+  input.features.push_back({features.of_light(), kNormalUnit});
   input.bandwidths = {kSharpBandwidth};
   gpu::nl_means(device, input, {{Place{&clean}}});
   device.launch(modulation(device, "modulate"), list_of(values), kOfList, clean, *features.albedo(),

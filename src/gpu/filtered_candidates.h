@@ -18,6 +18,8 @@ class FeatureBuffers {
   /// Null if there is none.
   const Buffer<float>* albedo() const { return albedo_ ? &albedo_ : nullptr; }
   const Buffer<float>* normal() const { return normal_ ? &normal_ : nullptr; }
+  /// feature_of_light().
+  const Buffer<float>* of_light() const { return of_light_ ? &of_light_ : nullptr; }
   /// Of the regression; null: without it.
   const FeatureBuffer* features() const { return features_.count > 0 ? &features_ : nullptr; }
   /// Whether the image itself is filtered by NL-means.
@@ -25,7 +27,7 @@ class FeatureBuffers {
   SurfaceBuffers surfaces() const;
 
  private:
-  Buffer<float> albedo_, normal_, albedo_behind_, normal_behind_;
+  Buffer<float> albedo_, normal_, albedo_behind_, normal_behind_, of_light_;
   FeatureBuffer features_;
   bool nl_means_ = true;
 };

@@ -86,6 +86,17 @@ TEST(GpuMixedDenoising, IsThatOfTheProcessor) {
   expect_same(image, {}, DenoiseMode::kAuto);
 }
 
+TEST(GpuMixedDenoising, TakesFeaturesOfEachHalf) {
+  const Pictures p;
+  Image other = p.albedo;
+  for (size_t i = 0; i < other.data.size(); ++i) other.data[i] += 0.1f * test::noise(5, i, 0);
+  std::fill_n(other.pixel(0, 20), 60, 0.0f);  // black pixels
+  const Features halves[] = {{&other, &p.normal}, {&p.albedo, &p.normal}};
+  Features features{&p.albedo, &p.normal};
+  features.halves = {&halves[0], &halves[1]};
+  expect_same(test::noisy_image(kWidth, kHeight, 12, 24, 1), features, DenoiseMode::kAuto);
+}
+
 TEST(GpuMixedDenoising, TakesManySamplesAndPixelsThatAreLeftOut) {
   const Pictures p;
   test::Grouped image = test::noisy_image(kWidth, kHeight, 8, 22, 1);

@@ -29,7 +29,7 @@ RowsOnDevice::RowsOnDevice(Device& device, const MeanMixture& request, const Tri
   stages_.run("copy samples and auxiliary images", [&] {
     groups_ = samples ? groups_of(device_, independent_, device_.borrow<float>(samples->handle(), samples->size()))
                       : upload(device_, independent_);
-    features_.emplace(device_, auxiliary_, kinds_);
+    upload_features();
   });
   stages_.run("means and errors", [&] { parts_ = parts_of_mean(device_, groups_); });
 }
@@ -46,10 +46,16 @@ RowsOnDevice::RowsOnDevice(Device& device, const PairMixture& request, const Tri
   stages_.run("copy images", [&] {
     groups_ = upload(device_, independent_);
     device_.write(groups_.valid, request.parts->valid);
-    features_.emplace(device_, auxiliary_, kinds_);
+    upload_features();
     parts_[0] = upload(device_, request.parts->whole);
     for (const int half : {0, 1}) parts_[half + 1] = upload(device_, request.parts->halves[half]);
   });
+}
+
+void RowsOnDevice::upload_features() {
+  features_[0].emplace(device_, auxiliary_, kinds_);
+  for (const int half : {0, 1})
+    if (auxiliary_.halves[half]) features_[half + 1].emplace(device_, *auxiliary_.halves[half], kinds_);
 }
 
 std::array<Image, 3> RowsOnDevice::noisy() {
@@ -74,7 +80,7 @@ void RowsOnDevice::make_candidates(const NetworkImages* network) {
     if (weighing) weighing_network_ = std::make_unique<Weighing>(device_, *weighing);
     for (size_t i = 0; i < parts_.size(); ++i) {
       candidates_[i] = device_.make<float>(3 * pixels() * n_candidates_);
-      filter(device_, groups_, *features_, base_, parts_[i], i > 0, {&candidates_[i], filtered});
+      filter(device_, groups_, features_of(i), base_, parts_[i], i > 0, {&candidates_[i], filtered});
       if (network && is_mean()) add_network(network->images[i], i);
       if (network && !is_mean())
         device_.write(candidates_[i], network->images[i].data, 3 * pixels() * (n_candidates_ - 1));
@@ -88,7 +94,7 @@ void RowsOnDevice::make_candidates(const NetworkImages* network) {
 WeighingBuffers RowsOnDevice::weighing_input(size_t part) const {
   const PartBuffers& p = parts_[part];
   return {groups_.width,      groups_.height,   &p.independent.mean,
-          &candidates_[part], &p.noisy_error(), features_->surfaces()};
+          &candidates_[part], &p.noisy_error(), features_of(part).surfaces()};
 }
 
 void RowsOnDevice::add_network(const Image& clean, size_t part) {
@@ -170,7 +176,7 @@ void RowsOnDevice::find_errors(MixedRows& rows) {
   rows.disagreement = downloaded(disagreement(device_, made, mixed_.image), 1);
   rows.result.bias = held_out_bias(device_, held_out, {&candidates_[1], &candidates_[2]});
   rows.result.risk_rows =
-      image_risk(device_, held_out, mixed_.image, parts_[0].independent, groups_, features_->surfaces());
+      image_risk(device_, held_out, mixed_.image, parts_[0].independent, groups_, features_of(0).surfaces());
   for (const auto& [error, n] : base_rows(device_, held_out, parts_[0].std_error)) rows.of_base.push_back({error, n});
   for (int p = 0; p < n_candidates_; ++p) {
     const size_t first = 3 * pixels() * p;
@@ -227,7 +233,7 @@ Image RowsOnDevice::denoised_layer(const Layer& layer, const Image* clean) {
     auto made = device_.make<float>(3 * pixels() * n_made());
     const int of_network = clean ? kNetworkCandidates : 0;
     for (int p = 0; p < of_network; ++p) device_.write(made, clean->data, 3 * pixels() * p);
-    filter(device_, groups_, *features_, base_, parts_[0], false, {&made, 3 * pixels() * of_network}, &means.noisy);
+    filter(device_, groups_, features_of(0), base_, parts_[0], false, {&made, 3 * pixels() * of_network}, &means.noisy);
     const bool is_shared = n_made() < n_candidates_;
     const Buffer<float> shared =
         is_shared ? weighing_network_->share_weight(shares_, weighing_input(0), mixed_.weights) : Buffer<float>();

@@ -23,6 +23,8 @@ namespace covary::gpu {
 /// Bytes of a device's memory for each pixel of the rows of a mean, and of the largest buffer.
 double bytes_of_mean(int groups);
 double largest_buffer_of_mean(int groups);
+/// Bytes for each pixel if both halves have features of their own.
+inline constexpr double kBytesOfHalfFeatures = 200;
 
 class RowsOnDevice {
  public:
@@ -64,6 +66,8 @@ class RowsOnDevice {
   bool is_mean() const { return base_ == CandidateBase::kMean; }
   size_t pixels() const { return static_cast<size_t>(groups_.pixels()); }
   int n_made() const;
+  void upload_features();
+  const FeatureBuffers& features_of(size_t part) const { return features_[part] ? *features_[part] : *features_[0]; }
   void add_network(const Image& clean, size_t part);
   Buffer<float> counts_of(int half);
   MixtureBuffers mixture_input();
@@ -83,7 +87,7 @@ class RowsOnDevice {
   const bool std_error_;
   Stages stages_;
   Groups groups_;
-  std::optional<FeatureBuffers> features_;
+  std::array<std::optional<FeatureBuffers>, 3> features_;  ///< those of the halves only if they have their own
   std::array<PartBuffers, 3> parts_;
   std::vector<CandidateMaker> makers_;
   int n_candidates_ = 0;

@@ -103,9 +103,11 @@ class BadArrays(PackageTest):
             self.assertTrue(message.startswith(f"crn: found {found}; expected an array of NumPy"), message)
             self.assertIn("of float32 [T, H, W, 3]", message)
         self.assertIn("independent: found", self.refused(CRN, None, TypeError))
-        self.assertIn("; numpy.stack(images) makes one of several", self.refused(CRN, list(INDEPENDENT), TypeError))
+        self.assertIn("; numpy.stack(images) makes one of several", self.refused(CRN, [3, 4], TypeError))
+        self.assertIn("found arrays of the shapes [20, 24, 3], [19, 24, 3]",
+                      self.refused(CRN, [INDEPENDENT[0], INDEPENDENT[1][1:]], ValueError))
         self.assertTrue(self.refused(None, error=covary.UsageError, denoise="none").startswith(
-            "crn: found None; without it"))
+            "denoise: found 'none'; without crn, images are only denoised"))
 
     def test_shapes(self):
         for shape, values in (("[20, 24, 3]", CRN[0]), ("[12, 20, 24, 2]", CRN[..., :2]),

@@ -136,6 +136,26 @@ class Denoise(BesideTest):
         self.assertEqual(said, ["denoising_normal: it has an effect only together with denoising_albedo",
                                 "denoising_albedo: it has an effect only together with denoising_normal"])
 
+    def test_features_of_each_render(self):
+        """Have the bits of the files' layers; the mean of all does not."""
+        rng = numpy.random.default_rng(7)
+        renders = numpy.stack([self.images[1][0], self.images[1][1]])
+        albedo, normal = (feature + 0.1 * rng.random((2, HEIGHT, WIDTH, 3), numpy.float32)
+                          for feature in (self.albedo, self.normal))
+        for i in range(2):
+            planes = {c: renders[i, :, :, k] for k, c in enumerate("RGB")}
+            planes |= {f"albedo.{c}": albedo[i, :, :, k] for k, c in enumerate("RGB")}
+            self.write(f"render{i}", planes | {f"sh_normal.{c}": normal[i, :, :, k] for k, c in enumerate("XYZ")})
+        self.run_program("denoise", "render0.exr", "render1.exr", "-o", "out.exr", "--oidn", "off", "--quiet",
+                         "--force")
+
+        def combined(albedo, normal):
+            return covary.combine(None, renders, samples=8, oidn="off", force=True, albedo=albedo, normal=normal).image
+        self.assert_same_bits(combined(albedo, normal).reshape(-1, 3), rgb(self.path / "out.exr"))
+        self.assertFalse((combined(albedo.mean(0), normal.mean(0)) == combined(albedo, normal)).all())
+        self.assertIn("albedo: found the shape [1, 20, 24, 3]; expected [2, 20, 24, 3]",
+                      self.message_of(ValueError, combined, albedo[:1], normal))
+
     def test_independent_image_alone(self):
         """Denoised, with layers that add up to it."""
         independent = self.images[1]
@@ -160,7 +180,7 @@ class Denoise(BesideTest):
         self.assertEqual(self.message_of(covary.UsageError, covary.combine, None, independent, denoise="auto",
                                          position=position),
                          "position: it has an effect only together with the albedo")
-        self.assertIn("crn: found None; without it, independent images can only be denoised",
+        self.assertIn("denoise: found 'none'; without crn, images are only denoised",
                       self.message_of(covary.UsageError, covary.combine, None, independent,
                                       denoise="none"))
         self.assertIn("crn: found None; 'iduw' needs the image with common random numbers",

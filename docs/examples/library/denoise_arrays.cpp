@@ -8,6 +8,7 @@
 #include <covary/combine/registry.h>
 #include <covary/combine/result_file.h>
 #include <covary/denoising/denoising_choice.h>
+#include <covary/denoising/render_features.h>
 #include <covary/film/image_file.h>
 
 #include <cstdio>
@@ -16,17 +17,16 @@
 
 using covary::Image;  // width, height, channels, and the floats in `data`: [y][x][channel]
 
-Image mean_of(Image a, const Image& b) {
-  for (size_t i = 0; i < a.data.size(); ++i) a.data[i] = (a.data[i] + b.data.at(i)) / 2;
-  return a;
-}
-
 int main(int argc, char** argv) try {
   if (argc != 4) return std::fprintf(stderr, "denoise_arrays RENDER.exr OTHER_SEED.exr OUT.exr\n"), 2;
   const auto layer = [&](int file, const char* name) { return covary::read_image(argv[file], name).image; };
   const Image renders[] = {layer(1, ""), layer(2, "")};  // linear RGB
-  const Image albedo = mean_of(layer(1, "Albedo"), layer(2, "Albedo"));
-  const Image normal = mean_of(layer(1, "N"), layer(2, "N"));
+  // Of each render: the noise of their mean, which is that of the picture's own samples, would pass for detail.
+  covary::RenderFeatures features;
+  for (const int file : {1, 2}) {
+    features.add(covary::feature::kAlbedo, argv[file], layer(file, "Albedo"));
+    features.add(covary::feature::kNormal, argv[file], layer(file, "N"));
+  }
 
   // [y][x][render][rgb]: of each pixel the means of all renders, of equal numbers of samples.
   const int width = renders[0].width, height = renders[0].height;
@@ -39,8 +39,7 @@ int main(int argc, char** argv) try {
   request.independent = covary::source_of({width, height, 2, samples.data()}, {.name = "my renders"});
   request.estimator = covary::make_default_estimator(false, {}, {covary::DenoisingChoice::kAuto});
   request.settings.std_error = true;
-  request.settings.features.albedo = &albedo;  // of the image's size; finite, with 0 where nothing was hit
-  request.settings.features.normal = &normal;  // in [-1, 1]
+  request.settings.features = features.view();
   request.checked = [](const covary::InputFindings& found) {
     for (const covary::Finding& finding : found.findings)
       if (finding.severity == covary::Finding::Severity::kWarning)
