@@ -40,7 +40,7 @@ RenderProgress::RenderProgress(const RenderOptions& options, const LoadedScene& 
   n_samples_ = is_unknown ? kUnknownSamples : n_pixels_ * samples_before_check(scene, make_plan(options), request);
   estimate_work_ = work_of_estimate(options, n_pixels_);
   threads_ = static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
-  auxiliary_begun_ = !request.aovs && !estimator_of(options).reads_features;
+  auxiliary_begun_ = !request.aovs && !request.alpha && !estimator_of(options).reads_features;
   line.limit(request.seconds);
   line.aim(request.until);
 }

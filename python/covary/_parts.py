@@ -79,7 +79,7 @@ class PartFolder:
             for name, film in rendered.films.items():
                 film.save(made / f"film-{name}.exr")
             for name, image in rendered.aovs.items():
-                write_image(made / f"aov-{name}.exr", image)
+                write_image(made / f"aov-{name}.exr", image if image.ndim == 3 else image[:, :, None].repeat(3, axis=2))
             (made / _FACTS).write_text(json.dumps({
                 "films": sorted(rendered.films), "aovs": sorted(rendered.aovs), "warnings": rendered.warnings,
                 "not_finite_samples": rendered.not_finite_samples, "negative_samples": rendered.negative_samples,
@@ -101,6 +101,7 @@ class PartFolder:
             facts = json.loads((place / _FACTS).read_text())
             films = {name: Film.load(place / f"film-{name}.exr") for name in facts["films"]}
             aovs = {name: read_image(place / f"aov-{name}.exr") for name in facts["aovs"]}
+            aovs = {name: image[:, :, 0] if name == "A" else image for name, image in aovs.items()}
             bad = tuple(BadSample(**{**each, "value": tuple(each["value"])}) for each in facts["bad_samples"])
             if any(film.crop != list(part.crop) for film in films.values()):
                 return None

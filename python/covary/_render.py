@@ -153,9 +153,9 @@ def _check_together(given: Mapping[str, Any]) -> None:
         raise UsageError(f"exposure: found {given['exposure']!r} without preview=True, where it has no effect")
     if given["estimator"] == "none" and given["denoise"] in (None, "none"):
         for name, without in (("device", "cpu"), ("aov_samples", None)):
-            if given[name] != without and not (name == "aov_samples" and given["aovs"]):
+            if given[name] != without and not (name == "aov_samples" and (given["aovs"] or given["alpha"])):
                 raise UsageError(f"{name}: found {given[name]!r} with estimator='none', where it has no effect"
-                                 + (" without aovs=True" if name == "aov_samples" else ""))
+                                 + (" without aovs=True or alpha=True" if name == "aov_samples" else ""))
     for first, second in (("resume", "overwrite"), ("until", "until_p95"),
                           ("until", "until_relative"), ("until_p95", "until_relative")):
         if given[first] and given[second]:
@@ -248,7 +248,7 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     _check_together({"resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "preview": preview,
                      "output": output, "passes": passes, "until": until, "until_p95": until_p95,
                      "until_relative": until_relative, "estimator": estimator, "denoise": denoise, "device": device,
-                     **{name: keywords.get(name) for name in ("exposure", "aov_samples", "aovs")}})
+                     **{name: keywords.get(name) for name in ("exposure", "aov_samples", "aovs", "alpha")}})
     declared = {name.replace("_", "-"): keywords.pop(name) for name in _DECLARED if name in keywords}
     view = {name: value for name, value in (("resolution", resolution), ("environment", environment),
                                             ("background", background), ("camera", camera))

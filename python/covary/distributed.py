@@ -127,7 +127,7 @@ class _Canvas:
         self.warnings.update(dict.fromkeys(rendered.warnings))
         x, y, width, height = part.crop
         for name, image in rendered.aovs.items():
-            frame = self.aovs.setdefault(name, numpy.zeros((self.height, self.width, 3), numpy.float32))
+            frame = self.aovs.setdefault(name, numpy.zeros((self.height, self.width, *image.shape[2:]), numpy.float32))
             frame[y:y + height, x:x + width] = image
         for name, film in rendered.films.items():
             groups = film.groups

@@ -52,7 +52,7 @@ void write_with_error(const std::string& path, nb::object array, nb::object std_
   std::map<std::string, Image> layers;
   for (const auto& [key, layer] : aovs) {
     const auto name = nb::cast<std::string>(key);
-    layers[name] = image_of(layer, "aovs: " + name);
+    layers[name] = layer_of(layer, "aovs: " + name);
   }
   const int width = result.estimate.width, height = result.estimate.height;
   run_work(

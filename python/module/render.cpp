@@ -207,7 +207,7 @@ nb::dict image_of_films(const Options& values, const Options& of_estimator, nb::
   if (result.passes.empty()) throw Error(ErrorCode::kUsage, "films: found none; expected those of a render");
   for (const auto& [name, image] : aovs) {
     const std::string key = nb::cast<std::string>(name);
-    result.aovs[key] = image_of(image, key);
+    result.aovs[key] = layer_of(image, key);
   }
   run_work(
       [&](WorkState& state) {

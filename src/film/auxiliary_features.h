@@ -27,4 +27,7 @@ struct AuxiliaryFeature {
 
 extern const std::array<AuxiliaryFeature, feature::kCount> kAuxiliaryFeatures;
 
+/// The auxiliary image of one channel that says how much of a pixel surfaces cover; it guides no denoiser.
+inline constexpr const char* kAlpha = "A";
+
 }  // namespace covary

@@ -72,13 +72,17 @@ std::string layer_of(const std::string& channel) {
   return channel.substr(0, dot == std::string::npos ? 0 : dot);
 }
 
-constexpr const char* kDepth = "Depth";  // the only auxiliary image with a single channel
+/// Auxiliary images with a single channel.
+constexpr std::array<const char*, 2> kGrey = {kAlpha, "Depth"};
 
-/// Names of the auxiliary images: Depth, and every channel triple that is not a group, mean, error or variance.
+bool is_grey(const std::string& name) { return std::ranges::find(kGrey, name) != kGrey.end(); }
+
+/// Names of the auxiliary images: those of one channel, and every channel triple that is not a group, mean, error or
+/// variance.
 std::vector<std::string> find_aovs(const ExrFile& file, bool has_groups) {
   std::vector<std::string> names;
   for (const ExrFile::Channel& channel : file.channels()) {
-    const std::string name = channel.name == kDepth ? kDepth : layer_of(channel.name);
+    const std::string name = is_grey(channel.name) ? channel.name : layer_of(channel.name);
     if (name.empty() || name == kVariance || name == kStdError || (name.starts_with("group") && has_groups)) continue;
     if (names.empty() || names.back() != name) names.push_back(name);
   }
@@ -162,7 +166,7 @@ Film read_film(const std::string& path) {
   if (file.find(std::string(kVariance) + ".R")) film.keep_sample_variance();
   const bool has_groups = groups > 1 || attributes.count(kShown);
   for (const std::string& name : find_aovs(file, has_groups))
-    film.aovs[name] = Image(film.width(), film.height(), name == kDepth ? 1 : 3);
+    film.aovs[name] = Image(film.width(), film.height(), is_grey(name) ? 1 : 3);
 
   Image means = has_groups ? Image(film.width(), film.height(), 3) : Image();
   const std::vector<ExrPlane> planes = film_planes(film, means);

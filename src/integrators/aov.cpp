@@ -28,7 +28,9 @@ constexpr float kTolerance = 0.01f;
 constexpr size_t kSurfacesPerRay = 3;
 
 /// Contribution of one camera ray to each image.
-using AuxiliarySample = std::array<Vec3, kImages>;
+struct AuxiliarySample : std::array<Vec3, kImages> {
+  float alpha = 0;
+};
 
 Vec3 to_vec(const Spectrum& colour) { return {colour.r, colour.g, colour.b}; }
 
@@ -52,6 +54,7 @@ bool ends_in_medium(const Scene& scene, const PathRandom& random, Ray& ray, Auxi
         values[feature::kAlbedo][c] =
             here.extinction[c] > 0 ? std::clamp(here.scattering[c] / here.extinction[c], 0.0f, 1.0f) : 0;
       values[feature::kDenoisingAlbedo] = values[feature::kAlbedo];
+      values.alpha = 1;
       return true;
     }
     if (!found || hit.bsdf_flags != kNullTransmission) return false;
@@ -105,7 +108,7 @@ class Round {
 
   /// Values of the first surface of a sample, and, unless that is mirror or glass, of the one behind.
   void meet(size_t sample, const Ray& ray, const SurfaceHit& hit) {
-    values_[sample] = {to_vec(hit.bsdf->albedo(hit)), hit.frame.n, hit.p, {}, {}};
+    values_[sample] = {{to_vec(hit.bsdf->albedo(hit)), hit.frame.n, hit.p, {}, {}}, 1};
     ++n_met_;
     if (hit.bsdf_flags & kSmooth)
       end_at(sample, hit, Spectrum(1));
@@ -177,8 +180,10 @@ AuxiliarySample auxiliary_means(Round& round, int x, int y, uint32_t most) {
   size_t n_met = 0;
   while (n < most && n_met < kSurfacesPerRay * most && largest > sqr(kTolerance)) {
     const uint32_t end = std::min(most, n + kRound);
-    for (const AuxiliarySample& values : round.trace(x, y, n, end))
+    for (const AuxiliarySample& values : round.trace(x, y, n, end)) {
+      sums.alpha += values.alpha;
       for (size_t i = 0; i < kImages; ++i) sums[i] += values[i], squares[i] += values[i] * values[i];
+    }
     n = end, n_met += round.n_met();
     largest = 0;
     const auto count = static_cast<float>(n);
@@ -187,17 +192,19 @@ AuxiliarySample auxiliary_means(Round& round, int x, int y, uint32_t most) {
         largest = std::max(largest, (squares[i][c] - sqr(sums[i][c]) / count) / sqr(count));
   }
   for (Vec3& sum : sums) sum *= 1 / static_cast<float>(n);
+  sums.alpha /= static_cast<float>(n);
   return sums;
 }
 
 }  // namespace
 
-void render_aovs(const Scene& scene, const PassSettings& pass, uint32_t most, Film& film,
-                 const std::atomic<bool>* stop) {
+void render_aovs(const Scene& scene, const PassSettings& pass, uint32_t most, Film& film, const std::atomic<bool>* stop,
+                 bool alpha) {
   PassSettings settings = pass;
   settings.sampler = Sampler::kSobol, settings.groups = 1;
   std::array<Image, kImages> images;
   for (Image& image : images) image = Image(film.width(), film.height(), 3);
+  Image alphas(film.width(), film.height(), 1);
   const auto stopped = [&] { return stop && stop->load(std::memory_order_relaxed); };
   std::atomic<uint64_t> n_done = 0;
   const auto width = static_cast<uint64_t>(film.width()), n_pixels = width * static_cast<uint64_t>(film.height());
@@ -208,11 +215,13 @@ void render_aovs(const Scene& scene, const PassSettings& pass, uint32_t most, Fi
       const AuxiliarySample means = auxiliary_means(round, film.crop().x + x, film.crop().y + y, most);
       for (size_t i = 0; i < kImages; ++i)
         for (int c = 0; c < 3; ++c) images[i].pixel(x, y)[c] = means[i][c];
+      *alphas.pixel(x, y) = means.alpha;
     }
     if (pass.progress) pass.progress(n_done += width, n_pixels);
   });
   if (stopped()) return;
   for (size_t i = 0; i < kImages; ++i) film.aovs[kAuxiliaryFeatures[i].layer] = std::move(images[i]);
+  if (alpha) film.aovs[kAlpha] = std::move(alphas);
 }
 
 }  // namespace covary

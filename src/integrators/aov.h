@@ -22,6 +22,7 @@ inline constexpr int kFollowedBounces = 8;
 ///     DenoisingAlbedo  reflectance of the first surface with more than delta lobes, times the throughput of the
 ///                      mirrors and panes of glass before it, in [0, 1]
 ///     DenoisingNormal  its shading normal in world space
+///     A                of one channel, if `alpha`: the fraction of rays that meet a surface or a medium
 ///
 /// In participating media, a ray ends where the sample's path first scatters, if that comes before a surface: there,
 /// the values are the scattering albedo, no normal, and the position. Boundaries of media (bsdf `null`) are then
@@ -32,6 +33,6 @@ inline constexpr int kFollowedBounces = 8;
 /// points of a Sobol' sequence with the pass's key, as good as four times as many independent ones. Tells
 /// PassSettings::progress the pixels done. If `stop` becomes true, ends at the next row and leaves film.aovs unchanged.
 void render_aovs(const Scene& scene, const PassSettings& pass, uint32_t most, Film& film,
-                 const std::atomic<bool>* stop = nullptr);
+                 const std::atomic<bool>* stop = nullptr, bool alpha = false);
 
 }  // namespace covary

@@ -49,7 +49,7 @@ RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const Ren
   for (const Phase& phase : plan.phases)
     for (const PassPlan& pass : phase.passes(state)) passes.push_back(pass);
   if (has_light_pass(scene, plan, request)) passes.push_back(light_pass_plan(plan, passes));
-  const bool aovs = request.aovs || plan.method->reads_features;
+  const bool aovs = request.aovs || request.alpha || plan.method->reads_features;
   RenderMemory memory = render_memory(plan, passes, window.width, window.height, aovs);
   memory.training = training_memory(scene, request);
   if (request.splits_layers()) {

@@ -105,7 +105,7 @@ class PlanRun {
   }
   /// Features of the whole window; empty if the plan reads none or they do not exist.
   Features features() const { return plan_.method->reads_features ? features_among(result_.aovs) : Features(); }
-  bool needs_aovs() const { return request_.aovs || plan_.method->reads_features; }
+  bool needs_aovs() const { return request_.aovs || request_.alpha || plan_.method->reads_features; }
   bool stopped() const { return callbacks_.stop && callbacks_.stop->load(); }
   /// The passes of every phase exist.
   bool all_begun() const {

@@ -93,7 +93,7 @@ void PlanRun::render_auxiliary_images() {
   Pass& last = state_.passes[camera_passes(state_.passes).size() - 1];
   PassSettings settings = last.settings;
   settings.progress = callbacks_.progress;
-  render_aovs(*scene_.scene, settings, aov_samples_, last.film, callbacks_.stop);
+  render_aovs(*scene_.scene, settings, aov_samples_, last.film, callbacks_.stop, request_.alpha);
   result_.aovs = std::exchange(last.film.aovs, {});
   if (callbacks_.auxiliary && !stopped()) callbacks_.auxiliary(result_.aovs);
   result_.seconds.auxiliary = watch.seconds();

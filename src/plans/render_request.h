@@ -37,6 +37,7 @@ struct RenderRequest {
   std::optional<float> relative_error;
   bool films_only = false;  ///< only the passes: no image is made of their films
   bool aovs = false;        ///< also the images Albedo, N and P
+  bool alpha = false;       ///< also the channel A
   /// At most, per pixel of the auxiliary images (integrators/aov.h), at least 1. Fewer with `seconds`, if need be.
   uint32_t aov_samples = 64;
   /// Also the images Edges01, Edges02, … of the last pass of camera samples (passes/sample_parts.h). Requires the
@@ -86,7 +87,7 @@ inline void declare_goal(Settings& s, RenderRequest& r) {
   s.whole("spp", r.spp, {.low = 1, .high = kMaxSamples}, "Samples per pixel over all passes; default: the scene's",
           kBasicPasses);
   s.text_as("until", r, "relmse=X", read_until,
-            "Add samples, up to `spp`, until the predicted error is X; relmse-p95=X: in 95 % of 16 x 16 blocks; "
+            "Add samples, up to a given `spp`, until the predicted error is X; relmse-p95=X: in 95 % of blocks; "
             "relative=X: 3 sigma of each pixel",
             kBasicPasses);
   std::optional<double> seconds;
@@ -118,6 +119,7 @@ inline void declare(Settings& s, RenderRequest& r) {
   s.real("exposure", r.exposure, {.low = -40, .high = 40}, NumberWord{"auto", kAutomaticExposure},
          "Stops by which the PNG is brighter than the image; auto: 0 unless a tenth of it is burnt or black");
   s.flag("aovs", r.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
+  s.flag("alpha", r.alpha, "Add the channel A: how much of a pixel surfaces cover");
   s.whole("aov-samples", r.aov_samples, {.low = 1, .high = 65536},
           "Most samples per pixel of albedo, normal and position; fewer are taken where they have little noise");
   std::string layers;

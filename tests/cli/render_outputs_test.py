@@ -57,6 +57,39 @@ class RenderTest(CliTest):
         return process.returncode, output, errors
 
 
+# A ball before the sky.
+BALL = """<scene version="3.0.0">
+<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>
+<sensor type="perspective"><transform name="to_world"><lookat origin="0, 0, 4" target="0, 0, 0" up="0, 1, 0"/>
+</transform><film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/>
+<string name="pixel_format" value="rgba"/><rfilter type="box"/></film></sensor>
+<shape type="sphere"><bsdf type="diffuse"><rgb name="reflectance" value="0.5"/></bsdf></shape>
+<emitter type="constant"/></scene>"""
+
+
+class Alpha(RenderTest):
+    def test_is_how_much_surfaces_cover(self):
+        self.write("ball.xml", BALL.encode())
+        command = ("render", "ball.xml", "--spp", "64")
+        said = self.good(*command, "-o", "plain.exr").stderr
+        self.assertIn("alpha is written if `--alpha` asks for it", said)
+        self.good(*command, "-o", "ball.exr", "--alpha", "--quiet")
+        self.good(*command, "-o", "film.exr", "--alpha", "--denoise", "none", "--quiet")
+        ball, plain, film = (read_exr((self.path / f"{name}.exr").read_bytes()) for name in ("ball", "plain", "film"))
+        self.assertEqual(sorted(set(ball) - set(plain)), ["A"])
+        self.assertEqual(ball["R"], plain["R"])
+        alpha = ball["A"]
+        self.assertEqual(film["A"], alpha)
+        self.assertEqual((alpha[0], alpha[16 * 32 + 16]), (0, 1))
+        self.assertTrue(any(0.2 < a < 0.8 for a in alpha), "on the edge")
+        for i in range(32 * 32):  # premultiplied: a ball of reflectance 0.5 under a white sky
+            self.assertAlmostEqual(film["R"][i], 0.5 * alpha[i], delta=0.15)
+        self.good(*command, "-o", "part.exr", "--alpha", "--crop", "8,8,16,16", "--quiet")
+        part = read_exr((self.path / "part.exr").read_bytes())["A"]
+        self.assertEqual(part, [alpha[32 * (y + 8) + x + 8] for y in range(16) for x in range(16)])
+        self.good("convert", "ball.exr", "ball.png", "--overwrite")
+
+
 class Signals(RenderTest):
     def interrupt(self, sent, *arguments, film):
         """Interrupts a render once its unfinished films have been written a few times, so that all have samples."""

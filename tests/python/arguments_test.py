@@ -51,7 +51,7 @@ RENDER = {"scene": (*NO_SCENE, ""), "spp": without_none(NO_SPP), "estimator": ("
           "denoise": ("yes", *NO_TEXT), "oidn": NO_TEXT, "device": ("gpu7", *NO_TEXT),
           "output": NO_PATH, "passes": NO_PATH, "resume": (True, *NO_FLAG),
           "overwrite": (True, *NO_FLAG), "checkpoint": (-1, 5, "1", True),
-          "preview": (True, *NO_FLAG), "aovs": NO_FLAG, "aov_samples": (0, -1, 2.5, "12"),
+          "preview": (True, *NO_FLAG), "alpha": NO_FLAG, "aovs": NO_FLAG, "aov_samples": (0, -1, 2.5, "12"),
           "layers": ("dirct", *NO_TEXT),
           "crop": (3, "0,0,4,4", (0, 0, 4), (0, 0, 0, 0), (-1, 0, 4, 4), (0, 0, 4.5, 4), (0, 0, 400, 4)),
           "filter": ("bx", *NO_TEXT),
@@ -75,7 +75,7 @@ BAD = {
     "covary.render_frames": {
         "scene": (*NO_PATH, None), "output": ("a.exr", None, *NO_PATH), "frames": (3, None, range(0), "x", "1-", [1]),
         **{name: RENDER[name] for name in ("spp", "estimator", "integrator", "until", "time", "seed", "denoise", "oidn",
-                                           "aovs", "aov_samples", "layers", "filter", "exposure", "sampling",
+                                           "aovs", "alpha", "aov_samples", "layers", "filter", "exposure", "sampling",
                                            "sampler", "groups", "save_training", "load_training", "threads",
                                            "progress")},
         **VIEW, "camera_path": NO_PATH, "fps": (0, "1", True), "history": NO_FLAG,
