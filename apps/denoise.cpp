@@ -75,8 +75,6 @@ void check_options(const DenoiseCommand& o) {
       if (is_same_file(o.inputs[i], o.inputs[k]))
         usage(fmt::format("'{}' and '{}' are the same file; renders of different seeds are needed", o.inputs[k],
                           o.inputs[i]));
-  if (o.inputs.size() > 1 && is_by_network(o))
-    usage("--mode oidn and --clean-features are for one image; `covary merge` makes one of films of covary");
   if (o.target && is_by_network(o))
     usage("--device runs mixtures of denoised images, not Open Image Denoise alone, which has devices of its own");
   if (o.clean_features && !is_by_network(o))
@@ -187,8 +185,9 @@ void add_denoise(CLI::App& app) {
   modes.insert(modes.end(), denoise_mode_names().begin() + 1, denoise_mode_names().end());
   command
       ->add_option("--mode", o->mode,
-                   "Open Image Denoise alone, or a mixture of denoised images with little bias, balanced, or with the "
-                   "least error; default: auto for several renders or groups, oidn for a single image")
+                   "Open Image Denoise alone, of the renders' mean, or a mixture of denoised images with little bias, "
+                   "balanced, or with the least error; default: auto for several renders or groups, oidn for a single "
+                   "image")
       ->check(one_of(modes));
   add_value(*command, "--oidn", o->oidn, "off|LIBRARY",
             "Open Image Denoise's library or its folder, or that of the Python package pyoidn or of its "

@@ -23,6 +23,7 @@
 #include "film/written_by.h"
 #include "filters/stray_values.h"
 #include "json_output.h"
+#include "metrics/alignment.h"
 #include "metrics/provenance.h"
 #include "network_memory.h"
 #include "risk_report.h"
@@ -49,9 +50,25 @@ std::map<std::string, std::string> new_attributes(const DenoiseCommand& o) {
   return attributes;
 }
 
+/// The mean over files of a layer, in the values that they store.
+Image mean_of(const std::vector<std::string>& paths, const std::string& layer) {
+  const ImagePlace place = inspect_image(paths[0]).place;
+  MeanFeature mean;
+  for (const std::string& path : paths) {
+    PlacedImage image = read_image(path, layer, ChecksumPolicy::kCheck, std::nullopt);
+    if (!(image.place == place))
+      throw Error(ErrorCode::kInput, fmt::format("'{}' has the pixels {}, '{}' has {}, or another frame around them",
+                                                 path, text_of(image.place.window), paths[0], text_of(place.window)));
+    warn_of_values(path, image.image);
+    if (paths.size() == 1) return std::move(image.image);
+    mean.add(path, with_usable_values(std::move(image.image)));
+  }
+  return mean.take_mean();
+}
+
 /// Alpha as an image; empty if it is 0 or 1 everywhere, with nothing to denoise.
-Image partial_alpha(const std::string& path, const std::string& channel) {
-  Image alpha = read_image(path, channel, ChecksumPolicy::kCheck, std::nullopt).image;
+Image partial_alpha(const std::vector<std::string>& paths, const std::string& channel) {
+  Image alpha = mean_of(paths, channel);
   const bool partial = std::any_of(alpha.data.begin(), alpha.data.end(), [](float a) { return a > 0 && a < 1; });
   return partial ? alpha : Image();
 }
@@ -111,11 +128,13 @@ Denoised denoise_by_network(const DenoiseCommand& o, const DenoiseTask& task, Pr
   require_memory_of_network(input, info.place.window, o.memory_mib);
   const ColourSpace colours = ImageRows(input, task.layer).colours();
   FeatureLayers features({o.inputs, task.picture, colours, o.albedo, o.normal, o.no_features}, false);
-  const PlacedImage image = read_image(input, task.layer, ChecksumPolicy::kCheck, std::nullopt);
-  warn_of_values(input, image.image);
-  if (const std::string by = denoised_by(info.attributes, info.channels, task.layer); !by.empty())
-    fmt::print(stderr, "warning: {} is denoised already ({}); give the render before denoising ({})\n", input, by,
-               where_to_set(RenderSetting::kNoDenoiser, written_by(info.attributes)));
+  const Image image = mean_of(o.inputs, task.layer);
+  for (const std::string& path : o.inputs) {
+    const ImageInfo of_file = inspect_image(path);
+    if (const std::string by = denoised_by(of_file.attributes, of_file.channels, task.layer); !by.empty())
+      fmt::print(stderr, "warning: {} is denoised already ({}); give the render before denoising ({})\n", path, by,
+                 where_to_set(RenderSetting::kNoDenoiser, written_by(of_file.attributes)));
+  }
   progress.begin("denoising");
   Denoiser denoiser(o.denoiser());
   const std::string guided = features.text();
@@ -130,16 +149,16 @@ Denoised denoise_by_network(const DenoiseCommand& o, const DenoiseTask& task, Pr
   const auto denoised = [&](const Image& noisy) { return denoiser.denoise(noisy, albedo, normal, o.clean_features); };
   Denoised result;
   const std::vector<std::string> picture = layer_channels(input, info.channels, task.picture.layer);
-  result.result.image.estimate = denoised(image.image);
+  result.result.image.estimate = denoised(image);
   result.result.source = {o.inputs, {picture[0], picture[1], picture[2]}, {}, task.prefix()};
   const std::string alpha = is_exr_image(input) ? alpha_channel(info.channels, picture[0]) : "";
-  if (Image values = alpha.empty() ? Image() : partial_alpha(input, alpha); !values.data.empty())
+  if (Image values = alpha.empty() ? Image() : partial_alpha(o.inputs, alpha); !values.data.empty())
     result.result.aovs[alpha] = as_alpha(denoised(values));
   result.attributes = new_attributes(o);
   result.attributes["covary:denoiser"] = "Open Image Denoise " + denoiser_info(o.denoiser()).version;
-  result.report = [=, width = image.image.width, height = image.image.height, seconds = watch.seconds()] {
+  result.report = [=, width = image.width, height = image.height, seconds = watch.seconds()] {
     fmt::print(stderr, "{}{}: {} x {}, {}, in {:.2f} s\n{}", o.output, task.text(), width, height, guided, seconds,
-               kErrorOfOneRender);
+               o.inputs.size() > 1 ? "" : kErrorOfOneRender);
   };
   return result;
 }

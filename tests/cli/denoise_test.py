@@ -301,6 +301,17 @@ class Denoise(RenderTest):
         self.bad(1, "'part.exr' has the pixels 48 x 32 at (4, 0); 'mitsuba0.exr' needs 48 x 32 at (0, 0)", *two,
                  "--albedo", "part.exr")
 
+    def test_the_network_alone_takes_the_mean_of_renders(self):
+        greys = [[0.25 * (i % 7), 0.5 * (i % 3)] for i in range(96)]
+        for k, name in enumerate("ab"):
+            self.write(f"{name}.exr", exr({c: [grey[k] for grey in greys] for c in "RGB"}, (12, 8)))
+        command = ("denoise", "a.exr", "b.exr", "--mode", "oidn", "--oidn", os.environ["STAND_IN_DENOISER"], "-o")
+        self.assertNotIn("one render does not tell", self.good(*command, "o.exr").stderr)
+        means = [sum(grey) / 2 for grey in greys]
+        self.assertEqual(read_exr((self.path / "o.exr").read_bytes())["G"], means[::-1], "upside down")
+        self.write("b.exr", exr({c: [0.5] * 24 for c in "RGB"}, (6, 4)))
+        self.bad(1, "'b.exr' has the pixels", *command, "p.exr")
+
     def test_bands_with_a_network(self):
         """The network sees the whole picture: the stand-in's pixels come from the other end of it."""
         size, chance = (16, 700), random.Random(3)
