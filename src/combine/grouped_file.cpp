@@ -204,7 +204,8 @@ void GroupedFile::take_film_facts(const std::string& path, const ExrFile& file, 
   const auto agree = [&](const char* key, std::string& value) {
     const std::string here = attribute(file, std::string("covary:") + key);
     if (files_.size() > 1 && here != value)
-      fail_input(path, fmt::format("{} is '{}', in {} '{}'{}", key, here, source_.files[0], value,
+      fail_input(path, fmt::format("{} is '{}', in {} '{}'{}{}", key, here, source_.files[0], value,
+                                   key == std::string_view("scene_hash") ? ": other scenes, frames or cameras" : "",
                                    hint_of_frames(path, source_.files[0])));
     value = here;
   };

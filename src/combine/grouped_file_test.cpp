@@ -154,8 +154,10 @@ TEST_F(GroupedFileTest, SaysWhatIsWrong) {
     return write(name, {""}, 0, {{"covary:scene_hash", scene}});
   };
   EXPECT_EQ(message({frame("f9_008.exr", "1"), frame("f9_012.exr", "2")}),
-            "f9_012.exr: scene_hash is '2', in f9_008.exr '1'; if these are frames of a sequence, give 'f9_###.exr'");
-  EXPECT_EQ(message({frame("a1.exr", "1"), frame("b2.exr", "2")}), "b2.exr: scene_hash is '2', in a1.exr '1'");
+            "f9_012.exr: scene_hash is '2', in f9_008.exr '1': other scenes, frames or cameras; if these are frames of "
+            "a sequence, give 'f9_###.exr'");
+  EXPECT_EQ(message({frame("a1.exr", "1"), frame("b2.exr", "2")}),
+            "b2.exr: scene_hash is '2', in a1.exr '1': other scenes, frames or cameras");
   for (const char* samples : {"many", "12 or so", "-4", "nan", "1e30"})
     EXPECT_EQ(
         message({write("odd.exr", {""}, 0, {{"covary:samples", samples}})}),
