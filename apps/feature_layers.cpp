@@ -149,17 +149,18 @@ FeatureLayers::FeatureLayers(const FeatureSearch& search, bool are_groups) {
   if (search.none) return;
   are_own_ = inspect_image(search.files[0]).attributes.contains(std::string("covary:") + film_key::kSceneHash);
   features_ = RenderFeatures(are_groups);
-  for (const std::string& path : search.files) {
-    const ImageInfo info = inspect_image(path);
-    const auto add = [&](feature::Index kind, FeatureKind of_file, const std::string& name) {
+  const auto add = [&](feature::Index kind, FeatureKind of_file, const std::string& name) {
+    for (const std::string& path : search.files) {
+      const ImageInfo info = inspect_image(path);
       features_.add(kind, path,
                     name.empty() ? find_feature(path, info, of_file, search.colours, search.picture)
                                  : named_feature(path, info, of_file, search.colours, name));
-    };
-    add(feature::kAlbedo, FeatureKind::kAlbedo, search.albedo);
-    add(feature::kNormal, FeatureKind::kNormal, search.normal);
-    add(feature::kPosition, FeatureKind::kPosition, "");
-  }
+    }
+    features_.close(kind);
+  };
+  add(feature::kAlbedo, FeatureKind::kAlbedo, search.albedo);
+  add(feature::kNormal, FeatureKind::kNormal, search.normal);
+  add(feature::kPosition, FeatureKind::kPosition, "");
 }
 
 std::string FeatureLayers::text() const {

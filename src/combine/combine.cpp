@@ -143,9 +143,12 @@ double memory_of_rows(const CombineRequest& request, int rows) {
   const int groups = holds_out ? std::min(request.crn ? crn_groups : all_groups, request.independent.groups) : 0;
   const double values = kImage * all_groups + 2 * kCount;
   const Features& features = request.settings.features;
-  double n_features = 0;
-  for (const Image* Features::*const image : kImagesOfFeatures) n_features += features.*image != nullptr;
-  if (features.halves[0]) n_features *= 3;
+  double n_features = 0;                 // as images of floats
+  constexpr double kOfDifference = 0.5;  // of 16 bits
+  for (size_t i = 0; i < feature::kCount; ++i) {
+    n_features += features.*kImagesOfFeatures[i] != nullptr;
+    if (features.differences) n_features += features.differences->values[i].empty() ? 0 : kOfDifference;
+  }
   const bool in_bands = rows < request.independent.height;
   // For bands: the estimate of the whole image; its standard error and bias are stored beside them.
   const double of_whole = n_features * kImage + (in_bands ? 3 * kImage + request.estimator.memory.of_whole : 0);

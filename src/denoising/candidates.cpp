@@ -12,6 +12,7 @@
 
 #include "core/error.h"
 #include "denoising/mirrored_halves.h"
+#include "denoising/part_features.h"
 #include "filters/residual_correction.h"
 
 namespace covary {
@@ -154,21 +155,23 @@ class NetworkWithFeatures {
 
  private:
   void prepare_features(int part) {
-    const Features& wanted = features_.of_part(part);
-    if (std::exchange(prepared_, &wanted) == &wanted) return;
+    const int wanted = features_.differences ? part : 0;
+    if (std::exchange(prepared_, wanted) == wanted) return;
     albedo_.reset(), normal_.reset();
-    const Features features = network_features(wanted);
-    if (!features.albedo) return;
-    const auto clean = [&](const char* name, const Image& feature) {
-      return std::make_shared<const Image>(features.clean ? feature : denoiser_.denoise_feature(name, feature));
+    const bool is_behind = network_features(features_).albedo == features_.denoising_albedo;
+    const auto clean = [&](const char* name, feature::Index kind) -> std::shared_ptr<const Image> {
+      if (!(features_.*kImagesOfFeatures[kind])) return nullptr;
+      Image feature = feature_of_part(features_, kind, wanted);
+      return std::make_shared<const Image>(features_.clean ? std::move(feature)
+                                                           : denoiser_.denoise_feature(name, std::move(feature)));
     };
-    albedo_ = clean("albedo", *features.albedo);
-    if (features.normal) normal_ = clean("normal", *features.normal);
+    albedo_ = clean("albedo", is_behind ? feature::kDenoisingAlbedo : feature::kAlbedo);
+    if (albedo_) normal_ = clean("normal", is_behind ? feature::kDenoisingNormal : feature::kNormal);
   }
 
   Denoiser denoiser_;
   const Features features_;
-  const Features* prepared_ = nullptr;  // the features that those below were made of
+  int prepared_ = -1;  // the part that those below are of
   std::shared_ptr<const Image> albedo_, normal_;
 };
 
@@ -243,10 +246,11 @@ CandidateMaker filtered_candidates(const Features& features, CandidateBase base,
   CandidateMaker maker;
   maker.names = filter_names(features, base, kinds);
   maker.make = [kept, features, base, kinds](std::span<const CandidateInput> inputs) {
-    if (!features.halves[0]) return filtered(*kept, base, inputs);
+    if (!features.differences) return filtered(*kept, base, inputs);
     std::vector<std::vector<Image>> all;
     for (const CandidateInput& in : inputs) {
-      FilterFeatures own = filter_features(features.of_part(in.part), kinds);
+      const PartFeatures of_part(features, in.part);
+      FilterFeatures own = filter_features(of_part.view(), kinds);
       own.wanted = kept->wanted;
       all.push_back(std::move(filtered(own, base, {&in, 1})[0]));
     }
@@ -274,12 +278,10 @@ void check_features(const Features& features, int width, int height) {
   }
   if (features.normal && !features.albedo)
     throw Error(ErrorCode::kInput, "a normal without an albedo is not used; give both");
-  for (const Features* half : features.halves) {
-    if (!half) continue;
-    check_features(*half, width, height);
-    for (const Image* Features::*const image : kImagesOfFeatures)
-      if (!(half->*image) != !(features.*image))
-        throw Error(ErrorCode::kInput, "the features of a half of the samples are other ones than those of all");
+  for (size_t i = 0; features.differences && i < feature::kCount; ++i) {
+    const size_t n = features.differences->values[i].size();
+    COVARY_CHECK(n == 0 || (features.*kImagesOfFeatures[i] && n == (features.*kImagesOfFeatures[i])->data.size()),
+                 "differences of features have their size");
   }
 }
 

@@ -298,12 +298,13 @@ Image Denoiser::denoise(Image rgb, std::shared_ptr<const Image> albedo, std::sha
   return image_of(run);
 }
 
-Image Denoiser::denoise_feature(const std::string& name, const Image& feature) {
+Image Denoiser::denoise_feature(const std::string& name, Image feature) {
   COVARY_CHECK(name == "albedo" || name == "normal", "a feature is an albedo or a normal");
   check_images(feature, nullptr, nullptr);
   const auto run = std::make_shared<Run>();
   run->library = library_;
-  run->inputs.emplace_back(name == "albedo" ? "albedo" : "normal", finite(copy_of(&feature)));
+  run->inputs.emplace_back(name == "albedo" ? "albedo" : "normal",
+                           finite(std::make_shared<const Image>(std::move(feature))));
   run->small_network = true;
   ++runs_;
   return image_of(run);

@@ -42,7 +42,7 @@ class Denoiser {
   Image denoise(Image rgb, std::shared_ptr<const Image> albedo, std::shared_ptr<const Image> normal,
                 bool clean_features = false);
   /// Prefilters a feature for use with `clean_features`. `name`: "albedo" or "normal".
-  Image denoise_feature(const std::string& name, const Image& feature);
+  Image denoise_feature(const std::string& name, Image feature);
   /// Number of images and features denoised so far.
   int runs() const { return runs_; }
 

@@ -258,13 +258,6 @@ TEST(MixedDenoising, RefusesFeaturesOfAnotherSizeThanTheImage) {
                         "{} x {} pixels; expected the same size, 3 channels and {} values",
                         kWidth / 2, kHeight / 2, half.data.size(), kWidth, kHeight, right.data.size()));
   EXPECT_EQ(message(nullptr, &right), "a normal without an albedo is not used; give both");
-  const Features whole{&right, &right}, other{&right};
-  MethodSettings settings;
-  settings.features = whole, settings.features.halves = {&whole, &other};
-  EXPECT_EQ(test_support::message_of([&] {
-              mean_denoiser(DenoiseMode::kError).image({{}, in.independent.view()}, settings);
-            }),
-            "the features of a half of the samples are other ones than those of all");
 }
 
 TEST(MixedDenoising, OfASinglePassDoesNotDependOnThreads) {

@@ -19,34 +19,30 @@ namespace covary {
 /// Limits values to [0, 1]; NaN stays.
 void limit_albedo(Image& albedo);
 
-/// The mean of images, and the means of the first, third, … and of the others, in which pixels that are NaN count as
-/// missing.
+/// The mean of the images of renders, in which pixels that are NaN count as missing, and what the means of the first,
+/// third, … and of the others differ by.
 class MeanFeature {
  public:
   /// The next render's image, of three channels, if it has one. `name`: of the render, for messages. Throws
   /// Error(kInput), naming it, if it is malformed or the size differs from the first one's.
   void add(const std::string& name, std::optional<Image> image);
-  /// 0 where all are missing; nothing without images.
-  std::optional<Image> mean() const;
-  /// The means of both halves; the mean of all where a half's are missing. There are two images or more.
-  std::array<Image, 2> halves() const;
-  /// Half the mean squared difference of the first two images over their mean square; 0 with fewer.
-  double noise() const { return noise_; }
-  int images() const { return n_images_; }
+  int images() const { return n_images_[0] + n_images_[1]; }
+  /// 0 where all are missing. Once, of one image or more.
+  Image take_mean();
+  /// FeatureDifferences::values and factors, 0 where a half has none; empty if halves differ by no more than rounding.
+  std::vector<uint16_t> difference() const;
+  std::array<float, 2> factors() const;
 
  private:
-  /// Images and their number in each pixel.
+  /// Images of a half and their number in each pixel.
   struct Sum {
     Image image;
     std::vector<uint16_t> n;
-    void add(const Image& other);
-    void divide(const Image* where_missing);
   };
-  void compare_with_first(const Image& second);
 
-  std::optional<Sum> all_, first_half_;
-  double noise_ = 0;
-  int n_renders_ = 0, n_images_ = 0;
+  std::array<Sum, 2> halves_;
+  std::array<int, 2> n_images_ = {0, 0};
+  int n_renders_ = 0;
 };
 
 /// Features of all samples and, where they differ between renders, of both halves.
@@ -58,21 +54,20 @@ class RenderFeatures {
   /// The feature of the next render, as MeanFeature::add() takes it. An albedo is limited to [0, 1]: renderers that
   /// estimate it by a sample, such as Mitsuba on rough metal, write 100 and more.
   void add(feature::Index kind, const std::string& name, std::optional<Image> image);
+  /// Nothing more of this kind is added: gives memory back.
+  void close(feature::Index kind);
   /// What was added, of all samples and of halves; without an albedo, there is no normal. Nothing may be added after
   /// it. Valid as long as this object lives and stays where it is.
   Features view();
   /// Takes a feature of all samples out.
   std::optional<Image> take(feature::Index kind);
-  bool has(feature::Index kind) const { return means_[kind].images() > 0 || of_part_[0][kind].has_value(); }
+  bool has(feature::Index kind) const { return sums_[kind].images() > 0 || images_[kind].has_value(); }
 
  private:
-  void finish();
-
-  bool are_of_groups_, is_finished_ = false, has_halves_ = false;
-  std::array<MeanFeature, feature::kCount> means_;
-  /// Of all samples and of both halves.
-  std::array<std::array<std::optional<Image>, feature::kCount>, 3> of_part_;
-  std::array<Features, 2> halves_;
+  bool are_of_groups_;
+  std::array<MeanFeature, feature::kCount> sums_;
+  std::array<std::optional<Image>, feature::kCount> images_;
+  FeatureDifferences differences_;
 };
 
 }  // namespace covary

@@ -10,6 +10,7 @@
 
 #include "combine/registry.h"
 #include "denoising/mixed_denoising.h"
+#include "denoising/part_features.h"
 #include "estimators/test_images.h"
 #include "risk/error_interval.h"
 #include "support/files.h"
@@ -17,6 +18,7 @@
 namespace covary::render_features_test {
 namespace {
 
+constexpr float kOfDifferences = 0.003f;  // of 8 digits
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 Image constant(std::initializer_list<float> pixels) {
@@ -33,7 +35,7 @@ std::vector<float> values(const Image& image) {
 
 void expect_near(const std::vector<float>& found, const std::vector<float>& expected) {
   ASSERT_EQ(found.size(), expected.size());
-  for (size_t i = 0; i < found.size(); ++i) EXPECT_NEAR(found[i], expected[i], 1e-6) << i;
+  for (size_t i = 0; i < found.size(); ++i) EXPECT_NEAR(found[i], expected[i], kOfDifferences) << i;
 }
 
 TEST(RenderFeatures, AreMeansOfAllRendersAndOfEverySecond) {
@@ -42,11 +44,11 @@ TEST(RenderFeatures, AreMeansOfAllRendersAndOfEverySecond) {
   features.add(feature::kAlbedo, "b", constant({0.2f, kNan, 0.5f, kNan}));
   features.add(feature::kAlbedo, "c", constant({0.6f, 0.8f, kNan, kNan}));
   const Features view = features.view();
-  ASSERT_TRUE(view.halves[0]);
+  ASSERT_TRUE(view.differences);
   expect_near(values(*view.albedo), (std::vector<float>{0.3f, 0.6f, 0.5f, 0}));
-  expect_near(values(*view.of_part(1).albedo), (std::vector<float>{0.35f, 0.6f, 0.5f, 0}));  // of all where it has none
-  expect_near(values(*view.of_part(2).albedo), (std::vector<float>{0.2f, 0.6f, 0.5f, 0}));
-  EXPECT_EQ(view.of_part(0).albedo, view.albedo);
+  expect_near(values(feature_of_part(view, feature::kAlbedo, 1)),
+              (std::vector<float>{0.35f, 0.6f, 0.5f, 0}));
+  expect_near(values(feature_of_part(view, feature::kAlbedo, 2)), (std::vector<float>{0.2f, 0.6f, 0.5f, 0}));
 }
 
 TEST(RenderFeatures, AssignRendersWithoutOne) {
@@ -55,9 +57,9 @@ TEST(RenderFeatures, AssignRendersWithoutOne) {
     features.add(feature::kAlbedo, "a", normal == 2 ? std::nullopt : std::optional(constant({normal / 8})));
     features.add(feature::kNormal, "a", constant({normal}));
   }
-  EXPECT_EQ(values(*features.view().of_part(1).albedo), std::vector<float>{0.25f}) << "of 1 and 3";
-  EXPECT_EQ(values(*features.view().of_part(2).albedo), std::vector<float>{0.5f});
-  EXPECT_EQ(values(*features.view().of_part(2).normal), std::vector<float>{3}) << "of 2 and 4";
+  expect_near(values(feature_of_part(features.view(), feature::kAlbedo, 1)), std::vector<float>{0.25f});
+  expect_near(values(feature_of_part(features.view(), feature::kAlbedo, 2)), std::vector<float>{0.5f});
+  expect_near(values(feature_of_part(features.view(), feature::kNormal, 2)), std::vector<float>{3});
 }
 
 TEST(RenderFeatures, HaveNoHalvesIfTheyAreAlike) {
@@ -67,12 +69,12 @@ TEST(RenderFeatures, HaveNoHalvesIfTheyAreAlike) {
     features.add(feature::kNormal, "a", constant({1})), features.add(feature::kNormal, "b", constant({1}));
     return features;
   };
-  EXPECT_FALSE(made(true, 0).view().halves[0]);
-  EXPECT_FALSE(made(false, 0.1f).view().halves[0]);
+  EXPECT_FALSE(made(true, 0).view().differences);
+  EXPECT_FALSE(made(false, 0.1f).view().differences);
   RenderFeatures noisy = made(true, 0.1f);
-  ASSERT_TRUE(noisy.view().halves[0]);
-  EXPECT_NEAR(noisy.view().of_part(2).albedo->data[0], 0.4f, 1e-6);
-  EXPECT_EQ(noisy.view().of_part(2).normal->data[0], 1);
+  ASSERT_TRUE(noisy.view().differences);
+  EXPECT_NEAR(feature_of_part(noisy.view(), feature::kAlbedo, 2).data[0], 0.4f, kOfDifferences);
+  EXPECT_EQ(feature_of_part(noisy.view(), feature::kNormal, 2).data[0], 1);
 }
 
 TEST(RenderFeatures, LimitAlbedos) {
@@ -147,9 +149,9 @@ struct NoisyFloor {
 
 TEST(RenderFeatures, OfHalvesKeepNoiseFromPassingForDetail) {
   NoisyFloor floor;
-  ASSERT_TRUE(floor.features.view().halves[0]);
+  ASSERT_TRUE(floor.features.view().differences);
   Features mean = floor.features.view();
-  mean.halves = {};
+  mean.differences = nullptr;
   const double of_mean = floor.predicted_over_true(mean), of_halves = floor.predicted_over_true(floor.features.view());
   EXPECT_LT(of_mean, 0.6);
   EXPECT_GT(of_halves, 0.75);

@@ -40,11 +40,15 @@ FeatureRows::FeatureRows(const Features& whole, int first, int n) {
     if (const Image* image = whole.*kImagesOfFeatures[i])
       images[i] = rows_of(*image, first, n), features.*kImagesOfFeatures[i] = &images[i];
   features.clean = whole.clean;
-  for (size_t half = 0; half < halves.size(); ++half)
-    if (whole.halves[half]) {
-      halves[half] = std::make_unique<FeatureRows>(*whole.halves[half], first, n);
-      features.halves[half] = &halves[half]->features;
-    }
+  if (!whole.differences) return;
+  differences.factors = whole.differences->factors;
+  for (size_t i = 0; i < feature::kCount; ++i) {
+    const std::vector<uint16_t>& values = whole.differences->values[i];
+    if (values.empty()) continue;
+    const auto row = static_cast<ptrdiff_t>(images[i].data.size()) / n;
+    differences.values[i].assign(values.begin() + first * row, values.begin() + (first + n) * row);
+  }
+  features.differences = &differences;
 }
 
 }  // namespace covary

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <memory>
 #include <vector>
 
 #include "denoising/candidates.h"
@@ -39,7 +38,7 @@ int mixed_halo(CandidateBase base, bool with_network, int halo_of_parts, const P
 /// Rows of auxiliary images.
 struct FeatureRows {
   std::array<Image, feature::kCount> images;
-  std::array<std::unique_ptr<FeatureRows>, 2> halves;
+  FeatureDifferences differences;
   Features features;
 
   FeatureRows(const Features& whole, int first, int n);

@@ -33,15 +33,18 @@ TEST(RowBands, HoldRowsOfFeatures) {
   Features whole;
   whole.albedo = &albedo;
   whole.clean = true;
-  const Features half = whole;
-  whole.halves = {&half, &half};
+  FeatureDifferences differences;
+  for (size_t i = 0; i < albedo.data.size(); ++i)
+    differences.values[feature::kAlbedo].push_back(upper_half(static_cast<float>(i)));
+  whole.differences = &differences;
   const FeatureRows rows(whole, 4, 3);
   ASSERT_TRUE(rows.features.albedo);
   EXPECT_EQ(rows.features.albedo->height, 3);
   EXPECT_EQ(rows.features.albedo->pixel(1, 1)[2], 5);
   EXPECT_FALSE(rows.features.normal);
   EXPECT_TRUE(rows.features.clean);
-  EXPECT_EQ(rows.features.of_part(2).albedo->data, rows.features.albedo->data);
+  ASSERT_EQ(rows.differences.values[feature::kAlbedo].size(), size_t{18});
+  EXPECT_EQ(from_upper_half(rows.features.differences->values[feature::kAlbedo][0]), 24);
 }
 
 }  // namespace

@@ -19,8 +19,8 @@ constexpr int kWidth = 30;
 struct Scene {
   int height;
   test::Grouped crn, independent;
-  Image albedo, normal, position, other_albedo;
-  std::array<Features, 2> halves;  // none unless set
+  Image albedo, normal, position;
+  FeatureDifferences differences;  // none unless set
 
   Scene(int rows, int groups)
       : height(rows),
@@ -36,8 +36,6 @@ struct Scene {
           normal.pixel(x, y)[c] = c == (y / 25) % 3;
           position.pixel(x, y)[c] = static_cast<float>(c == 0 ? x : y);
         }
-    other_albedo = albedo;
-    for (float& value : other_albedo.data) value += 0.1f;
     for (const int y : {0, 100, 200})  // left out
       independent.pixel(9, y)[4] = std::numeric_limits<float>::quiet_NaN();
   }
@@ -46,13 +44,13 @@ struct Scene {
     MethodSettings settings;
     settings.std_error = true;
     if (with_features) settings.features = {&albedo, &normal, nullptr, nullptr, &position};
-    if (halves[0].albedo) settings.features.halves = {&halves[0], &halves[1]};
+    if (with_features && !differences.values[0].empty()) settings.features.differences = &differences;
     return settings;
   }
   /// Gives each half features of its own.
   void set_halves() {
-    halves[0] = halves[1] = {&albedo, &normal, nullptr, nullptr, &position};
-    halves[1].albedo = &other_albedo;
+    for (size_t i = 0; i < albedo.data.size(); ++i)
+      differences.values[feature::kAlbedo].push_back(upper_half(static_cast<float>(i % 7) * 0.05f));
   }
 };
 

@@ -2,6 +2,7 @@
 #include "denoising/weighed_candidate.h"
 
 #include "denoising/mixed_rows.h"
+#include "denoising/part_features.h"
 #include "weighing/weighing.h"
 
 namespace covary {
@@ -21,7 +22,8 @@ void add_weighing_maker(const Features& features, std::vector<CandidateMaker>& m
   CandidateMaker maker;
   maker.names = {kWeighedName};
   maker.shares = [network, features](const CandidateInput& in, const CandidateSet& set) {
-    return network->shares({&set.base, set.candidates, in.std_error, surfaces_of(features.of_part(in.part))});
+    const PartFeatures of_part(features, in.part);
+    return network->shares({&set.base, set.candidates, in.std_error, surfaces_of(of_part.view())});
   };
   makers.push_back(std::move(maker));
 }

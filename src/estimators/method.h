@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -23,6 +24,19 @@
 
 namespace covary {
 
+/// Differences between features of the first and of the second half of the samples. A float's upper 16 bits are enough
+/// for them.
+struct FeatureDifferences {
+  std::array<std::vector<uint16_t>, feature::kCount> values;  ///< of each image; empty: it does not differ
+  /// Of each image and half: times the difference, added to the feature of all samples, that of the half.
+  std::array<std::array<float, 2>, feature::kCount> factors = {
+      {{0.5f, -0.5f}, {0.5f, -0.5f}, {0.5f, -0.5f}, {0.5f, -0.5f}, {0.5f, -0.5f}}};
+};
+inline uint16_t upper_half(float value) {
+  return static_cast<uint16_t>((std::bit_cast<uint32_t>(value) + 0x8000u) >> 16);
+}
+inline float from_upper_half(uint16_t half) { return std::bit_cast<float>(static_cast<uint32_t>(half) << 16); }
+
 /// Auxiliary images of the surfaces behind the pixels: three channels, of the image's size. Null if unknown; a normal
 /// is given only together with an albedo.
 struct Features {
@@ -33,12 +47,9 @@ struct Features {
   const Image* denoising_normal = nullptr;
   const Image* position = nullptr;  ///< of the first surface, in any unit
   bool clean = false;               ///< nearly noise-free, so that a network need not prefilter them
-  /// The same images of the halves of the samples, the first, third, … groups and the others; null: those above. Where
-  /// features have noise of the picture's own samples, their mean brings the noise of one half to the other's images.
-  std::array<const Features*, 2> halves = {};
-
-  /// Those for all samples (0) or a half of them (1, 2).
-  const Features& of_part(int part) const { return part > 0 && halves[part - 1] ? *halves[part - 1] : *this; }
+  /// What the images of the halves of the samples, the first, third, … groups and the others, differ by; null: nothing
+  /// (denoising/render_features.h).
+  const FeatureDifferences* differences = nullptr;
 };
 
 /// The images of Features, in the order of kAuxiliaryFeatures.

@@ -244,7 +244,7 @@ MixedDenoising mixed(Device& device, const MeanMixture& request, const Buffer<fl
   const GroupedImage& image = request.independent;
   BandNeeds needs;
   needs.bytes_per_pixel = bytes_of_mean(image.groups) + (request.layers.empty() ? 0 : bytes_of_layer(image.groups));
-  if (request.features.halves[0]) needs.bytes_per_pixel += kBytesOfHalfFeatures;
+  if (request.features.differences) needs.bytes_per_pixel += kBytesOfHalfFeatures;
   needs.largest_buffer_per_pixel = largest_buffer_of_mean(image.groups);
   const int halo = mixed_halo(CandidateBase::kMean, static_cast<bool>(request.network), kMeanHalo, request.weighting);
   const bool has_history = request.history.is_used(), is_whole = has_history || samples;

@@ -91,9 +91,11 @@ TEST(GpuMixedDenoising, TakesFeaturesOfEachHalf) {
   Image other = p.albedo;
   for (size_t i = 0; i < other.data.size(); ++i) other.data[i] += 0.1f * test::noise(5, i, 0);
   std::fill_n(other.pixel(0, 20), 60, 0.0f);  // black pixels
-  const Features halves[] = {{&other, &p.normal}, {&p.albedo, &p.normal}};
+  FeatureDifferences differences;
+  for (size_t i = 0; i < other.data.size(); ++i)
+    differences.values[feature::kAlbedo].push_back(upper_half(other.data[i] - p.albedo.data[i]));
   Features features{&p.albedo, &p.normal};
-  features.halves = {&halves[0], &halves[1]};
+  features.differences = &differences;
   expect_same(test::noisy_image(kWidth, kHeight, 12, 24, 1), features, DenoiseMode::kAuto);
 }
 

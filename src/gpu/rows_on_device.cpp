@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "denoising/part_features.h"
 #include "denoising/weighed_candidate.h"
 #include "gpu/held_out.h"
 #include "gpu/network_candidates.h"
@@ -54,8 +55,8 @@ RowsOnDevice::RowsOnDevice(Device& device, const PairMixture& request, const Tri
 
 void RowsOnDevice::upload_features() {
   features_[0].emplace(device_, auxiliary_, kinds_);
-  for (const int half : {0, 1})
-    if (auxiliary_.halves[half]) features_[half + 1].emplace(device_, *auxiliary_.halves[half], kinds_);
+  for (const int part : {1, 2})
+    if (auxiliary_.differences) features_[part].emplace(device_, PartFeatures(auxiliary_, part).view(), kinds_);
 }
 
 std::array<Image, 3> RowsOnDevice::noisy() {
