@@ -46,8 +46,7 @@ TEST(RenderFeatures, AreMeansOfAllRendersAndOfEverySecond) {
   const Features view = features.view();
   ASSERT_TRUE(view.differences);
   expect_near(values(*view.albedo), (std::vector<float>{0.3f, 0.6f, 0.5f, 0}));
-  expect_near(values(feature_of_part(view, feature::kAlbedo, 1)),
-              (std::vector<float>{0.35f, 0.6f, 0.5f, 0}));
+  expect_near(values(feature_of_part(view, feature::kAlbedo, 1)), (std::vector<float>{0.35f, 0.6f, 0.5f, 0}));
   expect_near(values(feature_of_part(view, feature::kAlbedo, 2)), (std::vector<float>{0.2f, 0.6f, 0.5f, 0}));
 }
 
