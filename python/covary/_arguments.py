@@ -273,11 +273,17 @@ def _type_of_option(name: str) -> Any:
     return getattr(RenderOptions.__annotations__[name], "__forward_arg__", inspect.Parameter.empty)
 
 
+#: Arguments by the names that others give them.
+_MEANT = {"width": "resolution", "height": "resolution", "size": "resolution", "samples": "spp"}
+
+
 def check_names(options: Iterable[str], arguments: Iterable[str]) -> None:
     """Raises UsageError for keywords that are misspelt arguments. Other unknown ones are left to the registry, which
     knows the options of estimators."""
+    known = set(arguments)
     for name in options:
-        near = difflib.get_close_matches(name, arguments, 1, 0.8 if len(name) > 4 else 0.6)
+        near = [_MEANT[name]] if _MEANT.get(name) in known else difflib.get_close_matches(
+            name, known, 1, 0.8 if len(name) > 4 else 0.6)
         if name not in RenderOptions.__annotations__ and near:
             raise UsageError(f"{name}: there is no such argument; did you mean {near[0]}?")
 

@@ -37,7 +37,9 @@ class Refusals(PackageTest):
         self.assertIn("something: there is no such argument",
                       self.message_of(covary.UsageError, covary.combine, None, INDEPENDENT, something=feature))
 
-        self.assertIn("did you mean spp?", self.message_of(covary.UsageError, covary.render, "room", ssp=8))
+        for given, meant in ({"ssp": 8}, "spp"), ({"samples": 8}, "spp"), ({"width": 320}, "resolution"):
+            self.assertIn(f"did you mean {meant}?",
+                          self.message_of(covary.UsageError, covary.render, "room", **given))
 
     def test_without_effect(self):
         of_none = {"estimator": "none"}
