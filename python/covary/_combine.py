@@ -12,7 +12,7 @@ from ._arguments import (
     Rule, array, check_names, check_some, checked, either, empty_or, flag, function, images, mapping_of, optional, path,
     text, whole,
 )
-from ._images import warn_of_features
+from ._images import doubts_of_features
 from ._options import DEFAULT, DEFAULT_OF_PAIRS, check_no_passes, declared_rules, text_options
 from ._result import Result
 from .errors import InputError, UsageError, _warn
@@ -78,8 +78,7 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, l
     `covary combine`. Raises InputError if the inputs do not match, UsageError for options that the estimator does not
     have.
     """
-    found: list[str] = []
-    warn_of_features(albedo, normal)
+    found = doubts_of_features(albedo, normal)
     crn, independent = _groups_first("crn", crn, found), _groups_first("independent", independent, found)
     if crn is None and not hasattr(independent, "samples_per_pixel"):
         counts, samples = _alone(independent, counts, samples)

@@ -15,7 +15,7 @@ from .errors import _warn
 if TYPE_CHECKING:
     from ._result import FloatArray
 
-_MUCH, _MANY = 1.5, 0.01  # a value of a feature, and a share of them, that cannot be right
+_MUCH, _MANY = 1.5, 0.2  # a value of a feature, and a share of them, that cannot be right (on metal, Mitsuba's are)
 _FILES = either("the name of a file, or a list of them", path, list_of(path, "a list of names of files"))
 
 
@@ -48,16 +48,18 @@ def read_groups(paths: str | PathLike[str] | Iterable[str | PathLike[str]], laye
     return groups
 
 
-def warn_of_features(albedo: Any, normal: Any) -> None:
+def doubts_of_features(albedo: Any, normal: Any) -> list[str]:
     """Of images that are something else, such as another render, or normals of 8 bits."""
     import numpy
 
+    doubts = []
     for name, image, within in (("albedo", albedo, "0 and 1"), ("normal", normal, "-1 and 1")):
         values = numpy.zeros(1) if image is None else numpy.asarray(image)
         beyond = float(numpy.mean(numpy.abs(values) > _MUCH)) if values.dtype.kind in "fiu" else 0  # else refused later
         if beyond > _MANY:
-            _warn(f"{name}: {beyond:.0%} of its values are far from between {within}; expected features of surfaces. "
-                  "Several renders are denoised by combine(None, [first, second])")
+            doubts.append(f"{name}: {beyond:.0%} of its values are far from between {within}; expected features of "
+                          "surfaces, not another render")
+    return doubts
 
 
 @checked(image=array, albedo=array, normal=array, oidn=empty_or(path))
@@ -70,6 +72,7 @@ def denoise(image: Any, albedo: Any = None, normal: Any = None, *, oidn: str | P
     Several renders of other seeds are denoised, with their error, by `combine(None, [first, second])`, which is what
     the command `covary denoise first.exr second.exr` does.
     """
-    warn_of_features(albedo, normal)
+    for doubt in doubts_of_features(albedo, normal):
+        _warn(f"{doubt}. Several renders are denoised by combine(None, [first, second])")
     denoised: FloatArray = _covary.denoise(image, albedo, normal, fspath(oidn))
     return denoised

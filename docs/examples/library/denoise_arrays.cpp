@@ -38,7 +38,7 @@ int main(int argc, char** argv) try {
   covary::CombineRequest request;  // refers to these arrays
   request.independent = covary::source_of({width, height, 2, samples.data()}, {.name = "my renders"});
   request.estimator = covary::make_default_estimator(false, {}, {covary::DenoisingChoice::kAuto});
-  request.settings.std_error = true;
+  request.settings.std_error = true;  // and the predicted error with it
   request.settings.features = features.view();
   request.checked = [](const covary::InputFindings& found) {
     for (const covary::Finding& finding : found.findings)
