@@ -81,6 +81,16 @@ void check_options(const DenoiseCommand& o) {
     usage("--clean-features is an option of --mode oidn; mixtures always denoise their auxiliary features first");
 }
 
+void warn_of_unfinished(const std::vector<std::string>& inputs) {
+  for (const std::string& path : inputs) {
+    const std::map<std::string, std::string> attributes = inspect_image(path).attributes;
+    const auto complete = attributes.find(std::string("covary:") + film_key::kComplete);
+    if (complete != attributes.end() && complete->second == "false")
+      fmt::print(stderr, "warning: {}: the render was interrupted; the same `covary render` with --resume ends it\n",
+                 printable(path));
+  }
+}
+
 /// The samples; null if the network takes the image alone. The next frame's are read from then on.
 std::shared_ptr<const FrameFile> frame_of(const DenoiseCommand& o, const DenoiseTask& task) {
   if (is_by_network(o)) return nullptr;
@@ -101,9 +111,12 @@ std::string run_one(const DenoiseCommand& o) {
   progress.begin("loading");
   ImagePlace place;
   std::vector<Denoised> all;
+  bool mixes = false;
+  warn_of_unfinished(o.inputs);
   for (const DenoiseTask& task : tasks_of(o)) {
     const std::shared_ptr<const FrameFile> frame = frame_of(o, task);
     const bool is_mixture = frame && frame->file().groups() > 1;
+    mixes = mixes || is_mixture;
     if (frame && !is_mixture && !o.mode.empty())
       throw Error(ErrorCode::kUsage, fmt::format("--mode {} needs a second render of another seed, or a film with two "
                                                  "groups or more (--groups); '{}' has one",
@@ -119,7 +132,10 @@ std::string run_one(const DenoiseCommand& o) {
   }
   write(o, place, all, progress);
   const std::optional<PredictedError>& error = all[0].predicted;
-  return o.output + (o.history ? ", with the frame before" : "") +
+  return o.output +
+         (!o.history ? ""
+          : mixes    ? ", with the frame before"
+                     : ", of one render, which takes no history") +
          (error ? ", " + prediction_text(*error, std::nullopt) : "");
 }
 

@@ -99,6 +99,7 @@ std::string outdated(const FramePatterns& patterns, int frame) {
   const std::string result = frame_name(patterns.output, frame), before = frame_name(patterns.output, frame - 1);
   if (!is_exr_image(result) || !is_exr_image(before)) return "";  // which do not say
   const std::map<std::string, std::string> attributes = inspect_image(result).attributes;
+  if (!attributes.contains("covary:estimator")) return "";  // of one render, by a network that takes no history
   const auto of = attributes.find(kHistoryAttribute);
   if (of == attributes.end()) return fmt::format("'{}' was made without the frame before, which was missing", result);
   return of->second == picture_in(before)

@@ -118,10 +118,11 @@ std::string interruption(const RenderReport& report) {
   }
   return fmt::format(
       "interrupted after {:.1f} of {:g} samples per pixel; '{}' is the image so far{}; the same command "
-      "with --resume continues",
+      "with --resume continues{}",
       result.samples_per_pixel(), result.camera_sum([](const Pass& p) { return p.settings.spp.mean(); }),
       options.request().output,
-      result.kept == options.request().output ? "" : ", '" + result.kept + "' holds its films");
+      result.kept == options.request().output ? "" : ", '" + result.kept + "' holds its films",
+      result.image.estimate.data.empty() && options.settings.denoising.denoises() ? ", and denoises it" : "");
 }
 
 }  // namespace

@@ -99,8 +99,8 @@ std::string next_text(const RenderReport& report, const PhaseTimes& times) {
     return fmt::format("`--resume --spp {:g}` adds to the samples in {}", 4 * std::round(result.samples_per_pixel()),
                        shell_text({o.request().passes}));
   if (!result.predicted || !result.predicted->doubt.empty() || o.request().until > 0) return "";
-  return fmt::format("`--until relmse={:.2g}`{} renders until half of it is left", result.predicted->relmse / 4,
-                     o.request().spp > 0 ? " instead of --spp" : "");
+  return fmt::format("`--until relmse={:.2g} --overwrite`{} renders until half of it is left",
+                     result.predicted->relmse / 4, o.request().spp > 0 ? " instead of --spp" : "");
 }
 
 void print_training(const RenderResult& result) {

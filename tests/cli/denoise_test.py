@@ -312,6 +312,15 @@ class Denoise(RenderTest):
         self.write("b.exr", exr({c: [0.5] * 24 for c in "RGB"}, (6, 4)))
         self.bad(1, "'b.exr' has the pixels", *command, "p.exr")
 
+    def test_frames_of_one_render_take_no_history(self):
+        chance = random.Random(4)
+        for n in (1, 2):
+            planes = {c: [chance.random() for _ in range(96)] for c in "RGB"}
+            self.write(f"f_{n}.exr", exr(planes | {f"Motion.{c}": [0.0] * 96 for c in "XYZ"}, (12, 8)))
+        command = ("denoise", "f_#.exr", "-o", "d_#.exr", "--oidn", os.environ["STAND_IN_DENOISER"])
+        self.assertIn("d_2.exr, of one render, which takes no history", self.good(*command).stderr)
+        self.assertIn("0 frames in", self.good(*command, "--resume").stderr)
+
     def test_bands_with_a_network(self):
         """The network sees the whole picture: the stand-in's pixels come from the other end of it."""
         size, chance = (16, 700), random.Random(3)

@@ -109,7 +109,7 @@ class Summary(CliTest):
         percent = 100 * facts["predicted_relmse"] ** 0.5
         self.assertAlmostEqual(float(left[1]) / percent, 1, delta=0.06)
         self.assertAlmostEqual(float(left[2]) / percent, 0.5 ** 0.5, delta=0.06)
-        hint = r"next: `--until relmse=([\de.-]+)` instead of --spp renders until half of it is left"
+        hint = r"next: `--until relmse=([\de.-]+) --overwrite` instead of --spp renders until half of it is left"
         goal = float(re.fullmatch(hint, lines[-1])[1])
         self.assertAlmostEqual(goal / facts["predicted_relmse"], 0.25, delta=0.13)
         self.assertNotIn("predicted relMSE", "".join(lines))
