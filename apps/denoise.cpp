@@ -82,13 +82,10 @@ void check_options(const DenoiseCommand& o) {
 }
 
 void warn_of_unfinished(const std::vector<std::string>& inputs) {
-  for (const std::string& path : inputs) {
-    const std::map<std::string, std::string> attributes = inspect_image(path).attributes;
-    const auto complete = attributes.find(std::string("covary:") + film_key::kComplete);
-    if (complete != attributes.end() && complete->second == "false")
+  for (const std::string& path : inputs)
+    if (is_unfinished(inspect_image(path)))
       fmt::print(stderr, "warning: {}: the render was interrupted; the same `covary render` with --resume ends it\n",
                  printable(path));
-  }
 }
 
 /// The samples; null if the network takes the image alone. The next frame's are read from then on.

@@ -141,8 +141,8 @@ Denoised denoise_by_network(const DenoiseCommand& o, const DenoiseTask& task, Pr
   const auto taken = [&](const char* name, feature::Index kind) -> std::shared_ptr<const Image> {
     std::optional<Image> feature = features.take(kind);
     if (!feature) return nullptr;
-    Image own = std::move(*feature);
-    return std::make_shared<const Image>(o.clean_features ? denoiser.denoise_feature(name, own) : std::move(own));
+    return std::make_shared<const Image>(o.clean_features ? denoiser.denoise_feature(name, std::move(*feature))
+                                                          : std::move(*feature));
   };
   const std::shared_ptr<const Image> albedo = taken("albedo", feature::kAlbedo),
                                      normal = taken("normal", feature::kNormal);

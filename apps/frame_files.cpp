@@ -29,6 +29,12 @@
 #include "usage_error.h"
 
 namespace covary {
+
+bool is_unfinished(const ImageInfo& image) {
+  const auto found = image.attributes.find(std::string("covary:") + film_key::kComplete);
+  return found != image.attributes.end() && found->second == "false";
+}
+
 namespace {
 
 /// Frames that exist in any of the images, or those asked for.
@@ -38,12 +44,6 @@ std::vector<int> frames_of_all(const FrameOptions& o, const FramePatterns& patte
   for (const std::string& pattern : patterns.images)
     for (const int frame : frames_of("", pattern)) frames.insert(frame);
   return {frames.begin(), frames.end()};
-}
-
-/// Whether its render was interrupted.
-bool is_unfinished(const ImageInfo& image) {
-  const auto found = image.attributes.find(std::string("covary:") + film_key::kComplete);
-  return found != image.attributes.end() && found->second == "false";
 }
 
 /// What is wrong with the header of a frame; `first`: that of the sequence's first frame, if it was read.

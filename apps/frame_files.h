@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "denoising/history.h"
+#include "film/image_file.h"
 #include "film/pictures.h"
 #include "sequences/motion_file.h"
 
@@ -29,6 +30,9 @@ void add_frame_options(CLI::App& command, FrameOptions& options, const std::stri
 /// The frame numbers of --frames or, if that is empty, those of the pattern's existing files. Throws Error(kUsage), and
 /// Error(kInput) if there are none.
 std::vector<int> frames_of(const std::string& frames, const std::string& pattern);
+
+/// Whether the file says that its render was interrupted.
+bool is_unfinished(const ImageInfo& image);
 
 /// The file of a frame; if the path has no '#', or a file has exactly this name, the file of all frames.
 std::string file_of_frame(const std::string& path, int frame);

@@ -249,6 +249,10 @@ CandidateMaker filtered_candidates(const Features& features, CandidateBase base,
     if (!features.differences) return filtered(*kept, base, inputs);
     std::vector<std::vector<Image>> all;
     for (const CandidateInput& in : inputs) {
+      if (in.part == 0) {
+        all.push_back(std::move(filtered(*kept, base, {&in, 1})[0]));
+        continue;
+      }
       const PartFeatures of_part(features, in.part);
       FilterFeatures own = filter_features(of_part.view(), kinds);
       own.wanted = kept->wanted;
