@@ -22,6 +22,7 @@
 #include "denoised_pictures.h"
 #include "denoising/mixed_denoising.h"
 #include "film/outputs.h"
+#include "frame_checks.h"
 #include "frame_files.h"
 #include "json_output.h"
 #include "numbers.h"

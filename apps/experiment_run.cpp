@@ -181,10 +181,11 @@ void tell_time(const lab::Suite& suite, lab::ExperimentOptions& options) {
   if (estimate.seconds < kLong) return;
   const uint32_t reference = suite.reference.files.empty() ? suite.reference.spp : 0;
   fmt::print(stderr,
-             "about {} for {}{}, by the speed of path tracing on cores without other work; --quick, "
+             "about {} for {}{}, by the speed of path tracing on cores without other work; {}"
              "--resolution and {}take less\n",
              format_duration(estimate.seconds), counted(static_cast<long>(estimate.runs - estimate.finished), "run"),
              estimate.finished > 0 ? fmt::format(" ({} made before)", estimate.finished) : "",
+             options.max_pixels == 0 ? "--quick, " : "",
              reference > 0 ? fmt::format("--reference-spp (two of {}) ", reference) : "fewer --seeds ");
 }
 

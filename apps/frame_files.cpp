@@ -18,8 +18,8 @@
 #include "core/printable.h"
 #include "core/stopwatch.h"
 #include "declared_options.h"
-#include "film/film.h"
 #include "film/image_file.h"
+#include "frame_checks.h"
 #include "frame_history.h"
 #include "imageio/exr_image.h"
 #include "motion_checks.h"
@@ -29,12 +29,6 @@
 #include "usage_error.h"
 
 namespace covary {
-
-bool is_unfinished(const ImageInfo& image) {
-  const auto found = image.attributes.find(std::string("covary:") + film_key::kComplete);
-  return found != image.attributes.end() && found->second == "false";
-}
-
 namespace {
 
 /// Frames that exist in any of the images, or those asked for.
@@ -44,81 +38,6 @@ std::vector<int> frames_of_all(const FrameOptions& o, const FramePatterns& patte
   for (const std::string& pattern : patterns.images)
     for (const int frame : frames_of("", pattern)) frames.insert(frame);
   return {frames.begin(), frames.end()};
-}
-
-/// What is wrong with the header of a frame; `first`: that of the sequence's first frame, if it was read.
-std::string problem_of(const std::string& path, std::optional<ImageInfo>& first) {
-  try {
-    ImageInfo info = inspect_image(path);
-    if (!first) {
-      first = std::move(info);
-      return "";
-    }
-    const CropWindow &here = info.place.window, &there = first->place.window;
-    if (!(info.place == first->place))
-      return fmt::format("'{}' has {} x {} pixels at ({}, {}), the first frame {} x {} at ({}, {})", path, here.width,
-                         here.height, here.x, here.y, there.width, there.height, there.x, there.y);
-    for (const auto& [a, b] : {std::pair{&*first, &info}, {&info, &*first}})
-      for (const ExrFile::Channel& channel : a->channels)
-        if (std::none_of(b->channels.begin(), b->channels.end(), [&](const auto& c) { return c.name == channel.name; }))
-          return fmt::format("'{}': the channel {} is {}{}", path, channel.name,
-                             b == &info ? "missing, which the first frame has" : "not in the first frame",
-                             is_unfinished(info) ? "; the frame is unfinished, and `covary render … --resume` ends it"
-                             : is_unfinished(*first) ? ", which is unfinished; `covary render … --resume` ends it"
-                                                     : "");
-    return "";
-  } catch (const Error& error) {
-    return error.what();
-  }
-}
-
-/// All files of frames that are read, as patterns.
-std::vector<std::string> read_patterns(const FramePatterns& patterns) {
-  std::vector<std::string> all = patterns.images;
-  for (const std::string& other : patterns.others)
-    if (!other.empty() && is_frame_pattern_of_input(other)) all.push_back(other);
-  return all;
-}
-
-/// Whether nothing more will be written to the file, as far as can be told: a file of another format is not waited for.
-bool is_finished(const std::string& path) {
-  std::error_code ignored;
-  const bool has_content = std::filesystem::file_size(path, ignored) > 0 && !ignored;
-  return is_finished_exr(path) || (has_content && !is_exr(path));
-}
-
-/// Takes frames out that a farm has not finished, unless their output is there, and returns them.
-std::vector<int> take_unfinished(std::vector<int>& frames, const FramePatterns& patterns) {
-  const std::vector<std::string> all = read_patterns(patterns);
-  std::vector<int> finished, left;
-  for (const int frame : frames) {
-    if (std::ranges::all_of(all, [&](const std::string& pattern) { return is_finished(frame_name(pattern, frame)); }))
-      finished.push_back(frame);
-    else if (!std::filesystem::exists(frame_name(patterns.output, frame)))
-      left.push_back(frame);
-  }
-  frames = std::move(finished);
-  return left;
-}
-
-/// Reads the headers of all files before the first frame is spent. Throws Error(kInput) naming the first problems.
-void check_frames(const std::vector<int>& frames, const FramePatterns& patterns) {
-  constexpr size_t kMaxNamed = 5;
-  std::vector<std::string> problems;
-  for (const std::string& pattern : read_patterns(patterns)) {
-    std::optional<ImageInfo> first;
-    for (const int frame : frames)
-      if (std::string problem = problem_of(frame_name(pattern, frame), first); !problem.empty())
-        problems.push_back(std::move(problem));
-  }
-  if (problems.empty()) return;
-  const size_t more = problems.size() - std::min(problems.size(), kMaxNamed);
-  problems.resize(problems.size() - more);
-  throw Error(ErrorCode::kInput,
-              fmt::format("{}{}; nothing was written. --resume leaves out frames whose files are missing or "
-                          "unfinished, and --frames takes others",
-                          fmt::join(problems, "; "),
-                          more > 0 ? fmt::format("; and {} more problems of frames", more) : std::string()));
 }
 
 }  // namespace
@@ -244,8 +163,14 @@ class Frames {
     return is_done;
   }
 
-  /// The summary; throws Error(kInput) if frames failed, or some are `left` because their files are not complete.
-  void finish(const std::vector<int>& left) const {
+  /// Frames whose headers do not fit: they failed.
+  void add_unfit(const std::vector<int>& frames) { failed_.insert(failed_.end(), frames.begin(), frames.end()); }
+
+  /// The summary; throws Error(kInput) if frames failed, or some are not there because files are not complete.
+  void finish(const std::vector<int>& unfinished) {
+    std::vector<int> left;
+    for (const int frame : unfinished) (o_.resume && is_there(frame) ? kept_ : left).push_back(frame);
+    std::ranges::sort(kept_), std::ranges::sort(failed_);
     if (!o_.quiet)
       fmt::print(stderr, "{} in {:.1f} s{}\n", counted(n_done_, "frame"), watch_.seconds(),
                  kept_.empty() ? "" : fmt::format("; {} existed already: {}", kept_.size(), text_of(kept_)));
@@ -369,8 +294,9 @@ void for_each_frame(const FrameOptions& o, const FramePatterns& patterns, bool h
   std::vector<int> numbers = frames_of_all(o, patterns);
   note_unexpected(o, numbers, patterns);
   const std::vector<int> left = o.resume ? take_unfinished(numbers, patterns) : std::vector<int>();
-  check_frames(numbers, patterns);
+  const std::vector<int> unfit = take_unfit(o, numbers, patterns);
   Frames frames(o, patterns, numbers, has_history, run);
+  frames.add_unfit(unfit);
   for (size_t i = 0; i < numbers.size(); ++i)
     frames.add(numbers[i], fmt::format("frame {} ({} of {})", numbers[i], i + 1, numbers.size()));
   frames.finish(left);

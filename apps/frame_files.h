@@ -31,9 +31,6 @@ void add_frame_options(CLI::App& command, FrameOptions& options, const std::stri
 /// Error(kInput) if there are none.
 std::vector<int> frames_of(const std::string& frames, const std::string& pattern);
 
-/// Whether the file says that its render was interrupted.
-bool is_unfinished(const ImageInfo& image);
-
 /// The file of a frame; if the path has no '#', or a file has exactly this name, the file of all frames.
 std::string file_of_frame(const std::string& path, int frame);
 
@@ -57,7 +54,7 @@ bool are_frames(const FrameOptions& options, const FramePatterns& patterns);
 /// returns what to say about the frame. Prints a line for each frame, and one for all in the end. The motion comes from
 /// the first file that has the layer; without any, and for files with several pictures, there is no history. Before the
 /// first frame, throws Error(kInput) if files are missing, unreadable, or of another size or channels than the first
-/// frame's; --resume leaves out frames that are missing or unfinished. A frame whose call throws Error(kInput) is left
+/// frame's; --resume leaves out frames that are, or are unfinished. A frame whose call throws Error(kInput) is left
 /// out; the next one starts a new history. Error(kInput) names all left out in the end. --watch waits for them. Throws
 /// Error(kInput) at once if the motion does not match, or if frames share a seed, which hides shared errors.
 void for_each_frame(const FrameOptions& options, const FramePatterns& patterns, bool has_history,

@@ -112,6 +112,8 @@ class Result:
             known["samples"] = f"{self.samples_per_pixel:g}"
         if self.predicted_bounds is not None:
             known["predicted_relmse_80"] = " ".join(f"{bound:.4g}" for bound in self.predicted_bounds)
+        if self.prediction_doubt:
+            known["prediction_doubt"] = self.prediction_doubt
         return known
 
     def to_dict(self) -> dict[str, Any]:

@@ -125,6 +125,7 @@ std::map<std::string, std::string> prediction_attributes(const std::optional<Pre
   attributes[film_key::kPredicted] = fmt::format("{:.4g}", predicted->relmse);
   if (const std::optional<PredictedBounds>& bounds = predicted->bounds)
     attributes[film_key::kPredictedBounds] = fmt::format("{:.4g} {:.4g}", bounds->low, bounds->high);
+  if (!predicted->doubt.empty()) attributes[film_key::kPredictionDoubt] = predicted->doubt;
   return attributes;
 }
 

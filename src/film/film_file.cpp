@@ -30,7 +30,7 @@ constexpr const char* kMaxSamples = "samples_most";
 bool is_derived(const std::string& key) {
   return key == kFormat || key == kGroups || key == kSamples || key == kMinSamples || key == kMaxSamples ||
          key == kFileChecksums || key == kShown || key == film_key::kPredicted || key == film_key::kPredictedBounds ||
-         key == film_key::kCleanFeatures;
+         key == film_key::kPredictionDoubt || key == film_key::kCleanFeatures;
 }
 
 std::string group_name(int group) { return fmt::format("group{:02d}", group); }

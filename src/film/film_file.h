@@ -11,11 +11,12 @@
 
 namespace covary {
 
-/// Attributes of files only, derived from the image: its predicted relMSE, and two bounds, separated by a space, that
-/// contain it in 80 of 100 renders.
+/// Attributes of files only, derived from the image: its predicted relMSE; two bounds, separated by a space, that
+/// contain it in 80 of 100 renders; and why the prediction is unreliable, if it is.
 namespace film_key {
 inline constexpr const char* kPredicted = "predicted_relmse";
 inline constexpr const char* kPredictedBounds = "predicted_relmse_80";
+inline constexpr const char* kPredictionDoubt = "prediction_doubt";
 inline constexpr const char* kCleanFeatures = "clean_features";  ///< "true": the auxiliary images are nearly noise-free
 }  // namespace film_key
 

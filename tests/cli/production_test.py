@@ -22,9 +22,9 @@ SIZE = (16, 12)
 DENOISE = ("denoise", "a.####.exr", "b.####.exr", "--oidn", "off", "-o", "o.####.exr")
 
 
-def noisy(seed):
+def noisy(seed, size=SIZE):
     chance = random.Random(seed)
-    return exr({c: [0.5 * chance.expovariate(1) for _ in range(SIZE[0] * SIZE[1])] for c in "RGB"}, SIZE)
+    return exr({c: [0.5 * chance.expovariate(1) for _ in range(size[0] * size[1])] for c in "RGB"}, size)
 
 
 class LongSequence(CliTest):
@@ -108,9 +108,10 @@ class UnfinishedFarm(CliTest):
         self.write("b.0001.exr", noisy("b1"))
         self.write("b.0003.exr", noisy("b3")[:700])
         message = self.bad(1, "b.0002.exr", *DENOISE).stderr
-        self.assertIn("nothing was written. --resume leaves out frames whose files are missing or unfinished", message)
+        self.assertIn("nothing was written. --resume leaves out such frames, and those whose files are missing or "
+                      "unfinished", message)
         self.assertEqual(list(self.path.glob("o.*")), [])
-        for more in ("1 frames in", "0 frames in"):
+        for more in ("1 frame in", "0 frames in"):
             result = self.run_covary(*DENOISE, "--resume")
             self.assertEqual(result.returncode, 1, result.stderr)
             self.assertIn(more, result.stderr)
@@ -121,12 +122,35 @@ class UnfinishedFarm(CliTest):
             self.write(f"b.{n:04d}.exr", noisy(f"b{n}"))
         self.assertIn("2 frames in", self.good(*DENOISE, "--resume").stderr)
 
+    def test_resume_leaves_out_frames_of_another_size(self):
+        for n in (1, 2, 3, 4):
+            for name in "ab":
+                self.write(f"{name}.{n:04d}.exr", noisy(f"{name}{n}", (20, 12) if n == 3 else SIZE))
+        self.bad(1, "'a.0003.exr' has 20 x ", *DENOISE)
+        result = self.run_covary(*DENOISE, "--resume")
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn("warning: frame 3 is left out: 'a.0003.exr' has 20 x ", result.stderr)
+        self.assertIn("covary: 1 of 4 frames failed: 3\n", result.stderr)
+        self.assertEqual(sorted(p.name for p in self.path.glob("o.*")), [f"o.000{n}.exr" for n in (1, 2, 4)])
+
+    def test_unfinished_frames_with_a_result_are_counted(self):
+        for n in (1, 2):
+            for name in "ab":
+                self.write(f"{name}.{n:04d}.exr", noisy(f"{name}{n}"))
+        self.good(*DENOISE)
+        self.write("b.0002.exr", noisy("b2")[:700])
+        self.assertIn("0 frames in", said := self.good(*DENOISE, "--resume").stderr)
+        self.assertIn("2 existed already: 1-2", said)
+
     def test_a_file_of_another_format_is_named(self):
         """It is not waited for."""
         for name in "ab":
             self.write(f"{name}.0001.exr", noisy(name))
         self.write("b.0001.exr", b"PF\n1 1\n-1.0\n" + bytes(12))
-        self.bad(1, "b.0001.exr: not an EXR file", *DENOISE, "--resume")
+        result = self.run_covary(*DENOISE, "--resume")
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn("warning: frame 1 (1 of 1) failed: b.0001.exr: not an EXR file", result.stderr)
+        self.assertIn("covary: 1 of 1 frame failed: 1\n", result.stderr)
 
 
 class WatchedFolder(CliTest):

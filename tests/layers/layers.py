@@ -394,9 +394,27 @@ def together_hides_no_constant(root):
     return problems
 
 
+def suites_are_run(root):
+    """A suite of Python tests runs if CMakeLists.txt beside it names the suite, or runs the file whole or by words."""
+    problems = []
+    for path in files(root, ["tests"], ("_test.py",)):
+        folder, name = os.path.split(path)
+        build = os.path.join(folder, "CMakeLists.txt")
+        text = read(root, build) if os.path.exists(os.path.join(root, build)) else ""
+        if re.search(rf"\b{name}(?=\s*\)|\s+[a-z])", text):
+            continue
+        for suite in ast.parse(read(root, path)).body:
+            tests = isinstance(suite, ast.ClassDef) and any(getattr(m, "name", "").startswith("test")
+                                                            for m in suite.body)
+            if tests and not re.search(rf"\b{suite.name}\b", text):
+                problems.append(f"{path}:{suite.lineno}: {build} does not run {suite.name}")
+    return problems
+
+
 CHECKS = [lines_fit, files_fit, functions_fit, modules_fit, includes_follow_arrows, links_follow_arrows,
           python_has_no_circle, architecture_draws_the_arrows, licence_lines, no_leftovers, citations_have_entries,
-          documented_names_match_registries, documented_parameters, documented_commands, together_hides_no_constant]
+          documented_names_match_registries, documented_parameters, documented_commands, together_hides_no_constant,
+          suites_are_run]
 
 
 def length_report(root):

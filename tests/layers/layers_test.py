@@ -203,6 +203,14 @@ class Planted(unittest.TestCase):
         self.write("README.md", "| `covary render SCENE` |\n")
         self.expect(layers.documented_commands, "lacks the command 'covary merge' of apps/merge.cpp:2")
 
+    def test_suite_that_is_not_run(self):
+        self.write("tests/cli/CMakeLists.txt", "suites(A a First)\nrun(${DIR}/b_test.py)\nrun(c_test.py word)\n")
+        suite = "class {}(Test):\n    def test_it(self):\n        pass\n"
+        self.write("tests/cli/a_test.py", suite.format("First") + suite.format("Second"))
+        self.write("tests/cli/b_test.py", suite.format("Third"))
+        self.write("tests/cli/c_test.py", suite.format("Fourth") + "class Base(Test):\n    pass\n")
+        self.expect(layers.suites_are_run, "a_test.py:4: tests/cli/CMakeLists.txt does not run Second")
+
     def test_long_file_is_reported(self):
         self.write("src/core/a.cpp", SPDX + "\n" * layers.LONG_FILE)
         self.assertEqual([f"src/core/a.cpp: {layers.LONG_FILE + 1} lines; would it be two files?"],
