@@ -11,6 +11,7 @@
 #include "plans/adaptive_plan.h"
 #include "plans/budget.h"
 #include "plans/denoised_passes.h"
+#include "plans/light_plan.h"
 #include "plans/render.h"
 #include "risk/plain_mean.h"
 
@@ -140,9 +141,11 @@ MethodImage image_of(const Plan& plan, std::span<const Pass> passes, int first_r
   // With common random numbers, errors of a mean are correlated between pixels, which variances do not show.
   settings.held_out = method.pair() || passes[0].plan.sampling == Sampling::kIndependent;
   settings.features = beside.features, settings.layers = beside.layers;
-  const Film sum = plan.adds_films ? joined(passes[0].film, passes[1].film) : Film();
+  const Film sum = plan.adds_films ? joined(passes[0].film, passes[1].film)
+                   : beside.light  ? sum_of_films(passes.back().film, *beside.light)
+                                   : Film();
   Samples samples;
-  samples.independent = rows_of(plan.adds_films ? sum : passes.back().film, first_row, n_rows);
+  samples.independent = rows_of(plan.adds_films || beside.light ? sum : passes.back().film, first_row, n_rows);
   if (method.pair()) samples.crn = rows_of(passes[0].film, first_row, n_rows);
   return method.image(samples, settings);
 }

@@ -80,6 +80,10 @@ void set_light_target(const Integrator& integrator, std::span<const Pass> camera
   light.settings.spp = static_cast<uint32_t>(std::min(light.wanted, groups * most));
 }
 
+bool denoises_light(const Plan& plan, const Film& camera, const Film& light) {
+  return plan.method->one_pass() && !plan.makes_film() && !plan.adds_films && camera.groups() == light.groups();
+}
+
 Film sum_of_films(const Film& camera, const Film& light) {
   if (camera.groups() != light.groups())
     throw Error(ErrorCode::kInput, "the films of camera and light differ in their number of groups: " +

@@ -27,6 +27,10 @@ int light_groups(const Plan& plan, std::span<const Pass> passes);
 /// integrator's weights assume, rounded to whole bundles for all groups, at least one in each.
 void set_light_target(const Integrator& integrator, std::span<const Pass> cameras, Pass& light);
 
+/// Whether the method gets the sum of both films, and so denoises the light paths, too: a method of one pass whose film
+/// and the light film have the same groups.
+bool denoises_light(const Plan& plan, const Film& camera, const Film& light);
+
 /// The film of the only camera pass plus the light film, group by group; both must have the same number of groups. The
 /// counts are the camera's. It cannot be resumed, as its attribute film_key::kLight says.
 Film sum_of_films(const Film& camera, const Film& light);

@@ -10,6 +10,7 @@
 
 #include "combine/combine.h"
 #include "combine/registry.h"
+#include "denoising/denoising_choice.h"
 #include "estimators/mean.h"
 #include "film/film_file.h"
 #include "film/splat_layer.h"
@@ -92,6 +93,19 @@ TEST(LightPlan, BesideCrnThereIsOneWhereItIsAskedFor) {
   }
   EXPECT_EQ(on.predicted->relmse, predicted_relmse(on.image));
   EXPECT_EQ(render(light_scene(), plain_plan(Sampling::kCrn), request_of(24)).passes.size(), 1u);
+}
+
+TEST(LightPlan, TheDefaultDenoisesTheLightPathsToo) {
+  const Method method = make_default_estimator(false, {}, {DenoisingChoice::kAuto, "off", {}});
+  const RenderResult result =
+      render(light_scene(LightTracing::kOn), estimator_plan(method, {.groups = 6}), request_of(24));
+  ASSERT_EQ(result.passes.size(), 2u);
+  const Film sum = sum_of_films(result.passes[0].film, result.passes[1].film);
+  MethodSettings settings{24, true};
+  settings.features = features_among(result.aovs);
+  const EstimatorResult expected = finish(method.image({{}, rows_of(sum, 0, kHeight)}, settings));
+  EXPECT_EQ(result.image.estimate.data, expected.estimate.data);
+  EXPECT_EQ(result.image.std_error.data, expected.std_error.data);
 }
 
 TEST(LightPlan, LightPathsFollowSamplesPixelsAndBundles) {

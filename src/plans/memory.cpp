@@ -33,7 +33,7 @@ RenderMemory render_memory(const Plan& plan, std::span<const PassPlan> passes, i
     min_groups = std::min(min_groups, pass.groups);
     const double film = n_pixels * ((pass.groups + (pass.sample_variance ? 1 : 0)) * kImageBytes + sizeof(uint32_t));
     memory.films += film + (pass.light ? kSplatBytes : 0);
-    if (pass.light && plan.makes_film()) memory.estimate += film;  // the sum of both films
+    if (pass.light && plan.method->one_pass()) memory.estimate += film;  // the sum of both films
   }
   if (aovs) memory.films += n_pixels * kAuxiliaryFeatures.size() * kImageBytes;
   // A copy for a viewer or the preview.

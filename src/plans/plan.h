@@ -97,12 +97,14 @@ struct Phase {
 
 /// What a method may read in addition to the films, for its rows.
 struct ExtraInputs {
-  Features features;          ///< if Method::reads_features
-  std::vector<Layer> layers;  ///< if Method::splits_layers(); empty if none were requested
+  Features features;            ///< if Method::reads_features
+  std::vector<Layer> layers;    ///< if Method::splits_layers(); empty if none were requested
+  const Film* light = nullptr;  ///< to be added to the samples, group by group (denoises_light() of light_plan.h)
 };
 
 /// If the integrator traces light, render() adds a pass "light" to those of the last phase; it advances with them, and
-/// its film is added to the image (light_plan.h). Phases and the method only see the passes of camera samples.
+/// its film is added to the image (light_plan.h), or to the samples that are denoised. Phases only see the passes of
+/// camera samples.
 struct Plan {
   std::shared_ptr<const Method> method;  ///< what the plan renders for
   std::vector<Phase> phases;

@@ -40,10 +40,11 @@ EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows, std::span<cons
       images[i] = rows_of(*image, first_row, n_rows), image = &images[i];
   for (size_t i = 0; i < layers.size(); ++i)
     beside.layers.push_back({layer_names_[i], rows_of(layers[i], first_row, n_rows)});
+  const std::span<const Pass> cameras = camera_passes(state_.passes);
   const Pass* light = light_pass(state_.passes);
+  if (light && denoises_light(plan_, cameras.back().film, light->film)) beside.light = &light->film, light = nullptr;
   const GroupedImage light_rows = light ? rows_of(light->film, first_row, n_rows) : GroupedImage{};
-  EstimatorResult image =
-      finish(image_of(plan_, camera_passes(state_.passes), first_row, n_rows, beside), light ? &light_rows : nullptr);
+  EstimatorResult image = finish(image_of(plan_, cameras, first_row, n_rows, beside), light ? &light_rows : nullptr);
   if (has_training()) add_training(state_.passes[0].film, result_.training, first_row, image);
   return image;
 }
