@@ -34,6 +34,16 @@ struct AuxiliarySample : std::array<Vec3, kImages> {
 
 Vec3 to_vec(const Spectrum& colour) { return {colour.r, colour.g, colour.b}; }
 
+/// The albedo of a surface seen along `direction`, the darker the more it shines itself: a denoiser that takes a lamp
+/// for the ceiling around it spreads its light (docs/notes/denoising.md, "Lamps that reflect").
+Spectrum albedo_seen(const SurfaceHit& hit, const Vec3& direction) {
+  const Spectrum albedo = hit.bsdf->albedo(hit);
+  if (!hit.emitter) return albedo;
+  const Spectrum emitted = hit.emitter->surface_radiance(hit, -direction);
+  const float reflects = max_component(albedo), shines = max_component(emitted);
+  return shines > 0 ? albedo * (sqr(reflects) / (sqr(reflects) + sqr(shines))) : albedo;
+}
+
 /// With media: continues to the first surface that is more than a boundary, like the sample's path, or to a collision
 /// before it. At a collision, sets the values (scattering albedo, no normal, position) and returns true. Otherwise
 /// returns false, and `ray` is the one to that surface, or leaves the scene.
@@ -90,7 +100,7 @@ class Round {
       meet(i, rays_[i], hit);
     }
     for (int bounce = 0; bounce < kFollowedBounces && !ways_.empty(); ++bounce) follow(bounce);
-    for (const Way& way : ways_) end_at(way.sample, way.hit, way.throughput);
+    for (const Way& way : ways_) end_at(way.sample, way.hit, -way.wo, way.throughput);
     return std::span(values_).first(n);
   }
 
@@ -108,17 +118,17 @@ class Round {
 
   /// Values of the first surface of a sample, and, unless that is mirror or glass, of the one behind.
   void meet(size_t sample, const Ray& ray, const SurfaceHit& hit) {
-    values_[sample] = {{to_vec(hit.bsdf->albedo(hit)), hit.frame.n, hit.p, {}, {}}, 1};
+    values_[sample] = {{to_vec(albedo_seen(hit, ray.d)), hit.frame.n, hit.p, {}, {}}, 1};
     ++n_met_;
     if (hit.bsdf_flags & kSmooth)
-      end_at(sample, hit, Spectrum(1));
+      end_at(sample, hit, ray.d, Spectrum(1));
     else
       ways_.push_back({sample, Spectrum(1), -ray.d, hit});
   }
 
   /// Values of the surface behind mirrors and glass of this throughput.
-  void end_at(size_t sample, const SurfaceHit& hit, const Spectrum& throughput) {
-    const Spectrum albedo = throughput * hit.bsdf->albedo(hit);
+  void end_at(size_t sample, const SurfaceHit& hit, const Vec3& direction, const Spectrum& throughput) {
+    const Spectrum albedo = throughput * albedo_seen(hit, direction);
     for (int c = 0; c < 3; ++c) values_[sample][feature::kDenoisingAlbedo][c] = std::clamp(albedo[c], 0.0f, 1.0f);
     values_[sample][feature::kDenoisingNormal] = hit.frame.n;
   }
@@ -136,7 +146,7 @@ class Round {
       const BsdfSample next =
           bsdf->sample(wo, random.get_1d(vertex, Event::kLobe), random.get_2d(vertex, Event::kDirection));
       if (!next.valid()) {
-        end_at(way.sample, way.hit, way.throughput);
+        end_at(way.sample, way.hit, -way.wo, way.throughput);
         continue;
       }
       way.throughput *= next.weight;
@@ -154,7 +164,7 @@ class Round {
       scene_.resolve(rays_[i], hits_[i], way.hit);
       ++n_met_;
       if (way.hit.bsdf_flags & kSmooth)
-        end_at(way.sample, way.hit, way.throughput);
+        end_at(way.sample, way.hit, -way.wo, way.throughput);
       else if (n_left++ != i)
         ways_[n_left - 1] = way;
     }
