@@ -156,9 +156,13 @@ Denoised denoise_by_network(const DenoiseCommand& o, const DenoiseTask& task, Pr
     result.result.aovs[alpha] = as_alpha(denoised(values));
   result.attributes = new_attributes(o);
   result.attributes["covary:denoiser"] = "Open Image Denoise " + denoiser_info(o.denoiser()).version;
+  const auto seeds = info.attributes.find(std::string("covary:") + film_key::kSeed);
+  const bool merged = seeds != info.attributes.end() && seeds->second.find(',') != std::string::npos;
   result.report = [=, width = image.width, height = image.height, seconds = watch.seconds()] {
     fmt::print(stderr, "{}{}: {} x {}, {}, in {:.2f} s\n{}", o.output, task.text(), width, height, guided, seconds,
-               o.inputs.size() > 1 ? "" : kErrorOfOneRender);
+               o.inputs.size() > 1 ? ""
+               : merged            ? kErrorOfMerged
+                                   : kErrorOfOneRender);
   };
   return result;
 }

@@ -8,7 +8,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <map>
-#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -29,30 +28,55 @@ bool is_unfinished(const ImageInfo& image) {
 
 namespace {
 
-/// What is wrong with the header of a frame; `first`: that of the sequence's first frame, if it was read.
-std::string problem_of(const std::string& path, std::optional<ImageInfo>& first) {
+/// The header of a frame's file, or why it cannot be read.
+struct Header {
+  int frame = 0;
+  ImageInfo info;
+  std::string problem;
+};
+
+Header header_of(int frame, const std::string& path) {
   try {
-    ImageInfo info = inspect_image(path);
-    if (!first) {
-      first = std::move(info);
-      return "";
-    }
-    const CropWindow &here = info.place.window, &there = first->place.window;
-    if (!(info.place == first->place))
-      return fmt::format("'{}' has {} x {} pixels at ({}, {}), the first frame {} x {} at ({}, {})", path, here.width,
-                         here.height, here.x, here.y, there.width, there.height, there.x, there.y);
-    for (const auto& [a, b] : {std::pair{&*first, &info}, {&info, &*first}})
-      for (const ExrFile::Channel& channel : a->channels)
-        if (std::none_of(b->channels.begin(), b->channels.end(), [&](const auto& c) { return c.name == channel.name; }))
-          return fmt::format("'{}': the channel {} is {}{}", path, channel.name,
-                             b == &info ? "missing, which the first frame has" : "not in the first frame",
-                             is_unfinished(info) ? "; the frame is unfinished, and `covary render … --resume` ends it"
-                             : is_unfinished(*first) ? ", which is unfinished; `covary render … --resume` ends it"
-                                                     : "");
-    return "";
+    return {frame, inspect_image(path), ""};
   } catch (const Error& error) {
-    return error.what();
+    return {frame, {}, error.what()};
   }
+}
+
+std::string text_of(const ImagePlace& place) {
+  const CropWindow& window = place.window;
+  const std::string frame = fmt::format(" of {} x {}", place.frame_width, place.frame_height);
+  return fmt::format("{} x {} pixels at ({}, {}){}", window.width, window.height, window.x, window.y,
+                     place.frame_width == window.width && place.frame_height == window.height ? "" : frame);
+}
+
+/// The first frame with the pixels that most have; null if none can be read.
+const Header* usual_of(const std::vector<Header>& headers) {
+  std::map<std::string, int> counts;
+  const Header* usual = nullptr;
+  for (const Header& header : headers)
+    if (header.problem.empty()) ++counts[text_of(header.info.place)];
+  for (const Header& header : headers)
+    if (header.problem.empty() && (!usual || counts[text_of(header.info.place)] > counts[text_of(usual->info.place)]))
+      usual = &header;
+  return usual;
+}
+
+/// What is wrong with a frame; "" if nothing is.
+std::string problem_of(const std::string& path, const Header& header, const Header& usual) {
+  if (!header.problem.empty()) return header.problem;
+  const ImageInfo &info = header.info, &other = usual.info;
+  if (!(info.place == other.place))
+    return fmt::format("'{}' has {}, frame {} has {}", path, text_of(info.place), usual.frame, text_of(other.place));
+  for (const auto& [a, b] : {std::pair{&other, &info}, {&info, &other}})
+    for (const ExrFile::Channel& channel : a->channels)
+      if (std::none_of(b->channels.begin(), b->channels.end(), [&](const auto& c) { return c.name == channel.name; }))
+        return fmt::format("'{}': the channel {} is {} frame {}{}", path, channel.name,
+                           b == &info ? "missing, which is in" : "not in", usual.frame,
+                           is_unfinished(info) ? "; the frame is unfinished, and `covary render … --resume` ends it"
+                           : is_unfinished(other) ? ", which is unfinished; `covary render … --resume` ends it"
+                                                  : "");
+  return "";
 }
 
 /// Whether nothing more will be written to the file, as far as can be told: a file of another format is not waited for.
@@ -88,10 +112,13 @@ namespace {
 std::map<int, std::vector<std::string>> problems_of(const std::vector<int>& frames, const FramePatterns& patterns) {
   std::map<int, std::vector<std::string>> problems;
   for (const std::string& pattern : read_patterns(patterns)) {
-    std::optional<ImageInfo> first;
-    for (const int frame : frames)
-      if (std::string problem = problem_of(frame_name(pattern, frame), first); !problem.empty())
-        problems[frame].push_back(std::move(problem));
+    std::vector<Header> headers;
+    for (const int frame : frames) headers.push_back(header_of(frame, frame_name(pattern, frame)));
+    const Header* const usual = usual_of(headers);
+    for (const Header& header : headers)
+      if (std::string problem = usual ? problem_of(frame_name(pattern, header.frame), header, *usual) : header.problem;
+          !problem.empty())
+        problems[header.frame].push_back(std::move(problem));
   }
   return problems;
 }

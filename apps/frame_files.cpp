@@ -196,7 +196,12 @@ class Frames {
       std::filesystem::remove(path);
       return false;
     }
-    const std::map<std::string, std::string> attributes = inspect_image(path).attributes;
+    const ImageInfo image = inspect_image(path);
+    if (!(image.place == inspect_image(frame_name(patterns_.images[0], frame)).place)) {
+      fmt::print(stderr, "note: '{}' has another size than its renders; it is made again\n", printable(path));
+      return false;
+    }
+    const std::map<std::string, std::string>& attributes = image.attributes;
     const auto found = attributes.find("covary:estimator");
     if (found == attributes.end() || found->second == patterns_.made_by) return true;
     throw Error(

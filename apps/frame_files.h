@@ -53,8 +53,8 @@ bool are_frames(const FrameOptions& options, const FramePatterns& patterns);
 /// Calls `run` with the number of each frame, and the history of the previous frame if that was run just before; it
 /// returns what to say about the frame. Prints a line for each frame, and one for all in the end. The motion comes from
 /// the first file that has the layer; without any, and for files with several pictures, there is no history. Before the
-/// first frame, throws Error(kInput) if files are missing, unreadable, or of another size or channels than the first
-/// frame's; --resume leaves out frames that are, or are unfinished. A frame whose call throws Error(kInput) is left
+/// first frame, throws Error(kInput) if files are missing, unreadable, or of another size or channels than most
+/// frames; --resume leaves out frames that are, or are unfinished. A frame whose call throws Error(kInput) is left
 /// out; the next one starts a new history. Error(kInput) names all left out in the end. --watch waits for them. Throws
 /// Error(kInput) at once if the motion does not match, or if frames share a seed, which hides shared errors.
 void for_each_frame(const FrameOptions& options, const FramePatterns& patterns, bool has_history,

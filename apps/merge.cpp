@@ -20,6 +20,7 @@
 #include "film/outputs.h"
 #include "plans/plan.h"
 #include "progress.h"
+#include "sequences/frame_names.h"
 #include "value_names.h"
 
 namespace covary {
@@ -109,6 +110,17 @@ void advise_on_images(const MergeOptions& options) {
                           first, estimator, advice));
 }
 
+void refuse_frames(const MergeOptions& options) {
+  for (const std::string& path : options.inputs)
+    if (is_frame_pattern(path) && !fs::exists(path))
+      throw Error(ErrorCode::kUsage,
+                  fmt::format("'{}': frames are merged one by one; to denoise them, give all renders without merging:\n"
+                              "  {}",
+                              path,
+                              shell_text({"covary", "denoise", options.inputs[0], options.inputs[1], "-o",
+                                          "denoised_####.exr"})));
+}
+
 Film merged_films(const MergeOptions& options) {
   try {
     return merge_film_files(options.inputs);
@@ -119,6 +131,7 @@ Film merged_films(const MergeOptions& options) {
 }
 
 void merge(const MergeOptions& options) {
+  refuse_frames(options);
   Outputs outputs;
   outputs.reads(options.inputs);
   outputs.writes_result("-o", options.output, OutputKind::kFilm, "merge", options.overwrite);

@@ -39,6 +39,9 @@ void print_notes(const DenoisingChoice& choice, const std::string& note);
 /// In place of error_lines(), for an image that nothing compares.
 inline constexpr const char* kErrorOfOneRender =
     "how good: unknown, as one render does not tell its noise; a second one of another seed does\n";
+inline constexpr const char* kErrorOfMerged =
+    "how good: unknown, as merging left one group of samples; denoise the renders themselves, or merge films with "
+    "--groups\n";
 /// How good an image is and, with `verbose`, its predicted error, each with a line feed; empty if it is unknown.
 std::string error_lines(const CombinedImage& combined, bool verbose);
 constexpr const char* kVerboseHelp = "In the summary, also the predicted error with its interval";

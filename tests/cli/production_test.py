@@ -133,6 +133,19 @@ class UnfinishedFarm(CliTest):
         self.assertIn("covary: 1 of 4 frames failed: 3\n", result.stderr)
         self.assertEqual(sorted(p.name for p in self.path.glob("o.*")), [f"o.000{n}.exr" for n in (1, 2, 4)])
 
+    def test_the_first_frame_may_be_the_one_of_another_size(self):
+        for n in (1, 2, 3):
+            for name in "ab":
+                self.write(f"{name}.{n:04d}.exr", noisy(f"{name}{n}", (8, 6) if n == 1 else SIZE))
+        self.assertIn("warning: frame 1 is left out: 'a.0001.exr' has 8 x 6 pixels at (0, 0), frame 2 has 16 x 12 pixels",
+                      self.run_covary(*DENOISE, "--resume").stderr)
+        self.good("denoise", "a.0001.exr", "b.0001.exr", "--oidn", "off", "-o", "o.0001.exr")
+        for name in "ab":
+            self.write(f"{name}.0001.exr", noisy(f"{name}1"))
+        said = self.good(*DENOISE, "--resume").stderr
+        self.assertIn("note: 'o.0001.exr' has another size than its renders; it is made again", said)
+        self.assertIn("1 frame in", said)
+
     def test_unfinished_frames_with_a_result_are_counted(self):
         for n in (1, 2):
             for name in "ab":
