@@ -68,6 +68,7 @@ class Result:
     bias_share: for denoised images: the fraction of predicted_relmse that is squared bias; None for others.
     risks: for denoised images: the relMSE that the mean of the samples and each denoised image alone would have had, by
         name.
+    network: name and version of the neural network that was used; "" without one.
     """
 
     image: FloatArray = field(repr=False)
@@ -83,6 +84,7 @@ class Result:
     aovs: dict[str, FloatArray] = field(repr=False)
     bias_share: float | None
     risks: dict[str, float]
+    network: str
 
     @checked(path=path, overwrite=flag)
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
@@ -107,7 +109,9 @@ class Result:
 
     def _attributes(self) -> dict[str, str]:
         """Of files, as programs write them."""
-        known = {"estimator": self.estimator, "command": f"covary {_SAVE} of Python"}
+        known = {"estimator": self.estimator, "command": f"covary {_SAVE} of Python", "version": _covary.version}
+        if self.network:
+            known["denoiser"] = self.network
         if self.samples_per_pixel is not None:
             known["samples"] = f"{self.samples_per_pixel:g}"
         if self.predicted_bounds is not None:
@@ -210,7 +214,6 @@ class RenderResult(Result):
     until_reached: whether the predicted error is at most the target; None without a target.
     time_choice: after a time limit: what the clock decided, as options of the program, which make the same image again;
         None without one, or if pixels may differ in their numbers of samples.
-    network: name and version of the neural network that was used; "" without one.
     predicted_relmse_p95: the predicted error that 95 % of the blocks of 16 x 16 pixels do not exceed; None if
         predicted_relmse is.
     not_finite_samples, negative_samples: samples of all passes that were not finite, or negative although they must not
@@ -224,7 +227,6 @@ class RenderResult(Result):
     complete: bool
     until_reached: bool | None
     time_choice: str | None
-    network: str
     predicted_relmse_p95: float | None
     not_finite_samples: int
     negative_samples: int
@@ -236,6 +238,4 @@ class RenderResult(Result):
                                  if name in of_film}
         if "Albedo" in self.aovs:
             known["clean_features"] = "true"
-        if self.network:
-            known["denoiser"] = self.network
-        return known | super()._attributes()
+        return super()._attributes() | known

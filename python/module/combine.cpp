@@ -277,12 +277,17 @@ nb::dict combine(nb::object crn, nb::object independent, const ExtraInputs& besi
   add_prediction(combined.predicted, combined.image.note, d);
   nb::dict layers;
   for (auto& [name, layer] : combined.layers) layers[name.c_str()] = array_of(std::move(layer));
+  for (size_t i = 0; i < feature::kCount; ++i)
+    if (const auto kind = static_cast<feature::Index>(i); features.has(kind))
+      if (const char* layer = kAuxiliaryFeatures[i].layer; !layers.contains(layer))
+        layers[layer] = array_of(std::move(*features.take(kind)));
   d["aovs"] = layers;
   std::vector<std::string> warnings = texts_of(combined.inputs.findings);
   if (target && target->made_by().empty()) warnings.push_back(combined.image.note);  // why the processor took over
   d["warnings"] = warnings;
   d["nonfinite_pixels"] = combined.image.nonfinite_pixels;
   d["estimator"] = estimator.text;
+  d["network"] = estimator.network;
   add_risks(combined.image, d);
   d["samples_per_pixel"] = samples;
   return d;

@@ -14,6 +14,7 @@
 #include "combine/same_seed.h"
 #include "core/error.h"
 #include "core/memory_limit.h"
+#include "core/stop.h"
 #include "core/stopwatch.h"
 #include "denoising/mixing_memory.h"
 #include "denoising/mixture_name.h"
@@ -336,7 +337,9 @@ EstimatorResult finish(MethodImage image, const GroupedImage* light) {
   return result;
 }
 
-CombinedImage combine(const CombineRequest& asked) {
+namespace {
+
+CombinedImage combine_to_the_end(const CombineRequest& asked) {
   if (asked.estimator.name.empty())
     throw Error(ErrorCode::kUsage, "no `estimator`; make_default_estimator() and make_estimator() make one");
   CombineRequest given = asked;
@@ -364,6 +367,17 @@ CombinedImage combine(const CombineRequest& asked) {
   combined.predicted = predicted_error(combined.image, counted ? samples : std::numeric_limits<double>::infinity(),
                                        request.estimator.reliable_samples);
   combined.estimate_seconds = watch.lap();
+  return combined;
+}
+
+}  // namespace
+
+CombinedImage combine(const CombineRequest& request) {
+  CombinedImage combined;
+  if (!run_stoppable(request.stop, [&] { combined = combine_to_the_end(request); })) {
+    combined = {};
+    combined.interrupted = true;
+  }
   return combined;
 }
 

@@ -3,6 +3,7 @@
 // adds the light film. The one pipeline of `covary combine`, Python and C++; renders end with its last two steps.
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <limits>
 #include <map>
@@ -41,6 +42,7 @@ struct CombineRequest {
   std::optional<double> max_memory;
   /// Called after the inputs are checked, before errors among the findings are thrown.
   std::function<void(const InputFindings&)> checked;
+  const std::atomic<bool>* stop = nullptr;  ///< true, from any thread, ends combine() soon
 };
 
 struct CombinedImage {
@@ -51,6 +53,7 @@ struct CombinedImage {
   InputFindings inputs;
   double planned_memory = 0;  ///< planned_memory() of the request
   double check_seconds = 0, estimate_seconds = 0;
+  bool interrupted = false;  ///< by CombineRequest::stop; nothing else is known then
 };
 
 /// Checks the two images as combine() does. Throws Error(kInput) if they do not show the same pixels.

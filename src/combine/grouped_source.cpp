@@ -35,9 +35,9 @@ GroupedSource source_of(const GroupedFile& file) {
 
 GroupedSource source_of(const GroupedImage& image, ImageOrigin origin) {
   if (image.width < 1 || image.height < 1 || image.groups < 1 || !image.data)
-    throw Error(ErrorCode::kUsage, fmt::format("{}: the image is empty: {} x {} pixels, {}{}", origin.name, image.width,
-                                               image.height, counted(image.groups, "group"),
-                                               image.data ? "" : ", no data"));
+    throw Error(ErrorCode::kUsage,
+                fmt::format("{}: the image is empty: {} x {} pixels, {}{}", origin.name, image.width, image.height,
+                            counted(image.groups, "group"), image.data ? "" : ", no data"));
   GroupedSource source;
   source.origin = std::move(origin);
   source.width = image.width, source.height = image.height, source.groups = image.groups;
@@ -54,6 +54,13 @@ GroupedSource source_of(const GroupedImage& image, ImageOrigin origin) {
   source.samples = whole.mean_count;
   source.rows = [image = whole](int first, int n) { return rows_of(image, first, n); };
   return source;
+}
+
+GroupedSource source_of(const Film& film, const std::string& name) {
+  ImageOrigin origin;
+  origin.name = name, origin.is_one_film = true;
+  origin.place = {film.frame_width(), film.frame_height(), film.crop()};
+  return source_of(rows_of(film, 0, film.height()), origin);
 }
 
 }  // namespace covary

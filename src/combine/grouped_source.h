@@ -3,9 +3,11 @@
 #pragma once
 
 #include <functional>
+#include <string>
 
 #include "combine/grouped_file.h"
 #include "combine/pair_input.h"
+#include "film/film.h"
 #include "film/grouped_image.h"
 
 namespace covary {
@@ -26,5 +28,7 @@ GroupedSource source_of(const GroupedFile& file);
 /// The memory that `image` refers to must outlive the source. An origin without a place: of the whole frame. Throws
 /// Error(kUsage) for an empty image, and for a place of another size.
 GroupedSource source_of(const GroupedImage& image, ImageOrigin origin);
+/// A film of a render, which must outlive the source. `name`: for messages.
+GroupedSource source_of(const Film& film, const std::string& name);
 
 }  // namespace covary

@@ -100,6 +100,16 @@ class Package(unittest.TestCase):
         with self.assertRaisesRegex(AssertionError, r"denoise_arrays: .*none\.exr"):
             self.run_in_folder(self.examples / "denoise_arrays", "none.exr", *renders)
 
+    def test_a_film_is_denoised_as_a_render_is(self):
+        printed = self.run_in_folder(self.examples / "denoise_render", ROOM, "noisy.exr", "later.exr")
+        predicted = float(re.fullmatch(r"predicted relMSE (0\.\d+)\n", printed)[1])
+        self.run_in_folder(self.prefix / "bin" / "covary", "render", ROOM, "-o", "once.exr", "--resolution", "120x80",
+                           "--spp", 24, "--groups", 12, "--quiet")
+        later, once = rgb(self.work / "later.exr"), rgb(self.work / "once.exr")
+        self.assertEqual(later, once)
+        self.assertNotEqual(rgb(self.work / "noisy.exr"), later)
+        self.assertGreater(predicted, 0)
+
     def test_combining_arrays_gives_the_image_of_the_program(self):
         self.run_in_folder(self.prefix / "bin" / "covary", "render", ROOM, "-o", "out.exr", "--resolution", "48x32",
                            "--spp", 4 * GROUPS, "--groups", GROUPS, "--estimator", "iicv", "--passes", "passes",
@@ -188,7 +198,7 @@ class Package(unittest.TestCase):
 
     def test_programs_are_compiled_for_every_processor(self):
         commands = json.loads((self.examples / "compile_commands.json").read_text())
-        self.assertEqual(len(commands), 5)
+        self.assertEqual(len(commands), 6)
         for command in commands:
             self.assertNotRegex(command["command"], r"\s-(m|f(?!sanitize)|O|W)")
 

@@ -8,6 +8,7 @@ import unittest
 import covary
 import numpy
 from common import HEIGHT, ROOM, WIDTH, PackageTest, channels, noisy, pair, rgb
+from exr_reader import read_exr
 from exr_writer import exr
 
 SIZE = ("--resolution", "24x20")
@@ -162,8 +163,12 @@ class Denoise(BesideTest):
         result = covary.combine(None, independent, denoise="auto", oidn="off", albedo=self.albedo, normal=self.normal,
                                 layers={"half": 0.5 * independent, "third": independent / 3})
         self.assertEqual(result.estimator, "mixture --denoise auto --oidn off")
-        self.assertEqual(list(result.aovs), ["Rest", "half", "third"])
-        numpy.testing.assert_allclose(sum(result.aovs.values()), result.image, rtol=1e-5, atol=1e-6)
+        self.assertEqual(list(result.aovs), ["Rest", "half", "third", "Albedo", "N"])
+        layers = [result.aovs[name] for name in ("Rest", "half", "third")]
+        numpy.testing.assert_allclose(sum(layers), result.image, rtol=1e-5, atol=1e-6)
+        numpy.testing.assert_array_equal(result.aovs["Albedo"], self.albedo)
+        result.save(self.path / "kept.exr")
+        self.assertIn("Albedo.R", read_exr((self.path / "kept.exr").read_bytes()))
         numpy.testing.assert_allclose(result.aovs["half"], 0.5 * result.image, rtol=1e-4, atol=1e-5)
         self.write_features(("Albedo", "N"), (self.albedo, self.normal))
         self.run_program("combine", "--independent", "independent.exr", "-o", "out.exr", "--denoise", "auto",

@@ -3,7 +3,7 @@
 //
 //     denoise_arrays RENDER.exr OTHER_SEED.exr OUT.exr
 //
-// The two files, which have layers Albedo and N, stand for a renderer of your own.
+// The two files, which have layers Albedo and N, stand for a renderer of your own. Ctrl-C ends it soon.
 #include <covary/combine/combine.h>
 #include <covary/combine/registry.h>
 #include <covary/combine/result_file.h>
@@ -11,11 +11,15 @@
 #include <covary/denoising/render_features.h>
 #include <covary/film/image_file.h>
 
+#include <atomic>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <vector>
 
 using covary::Image;  // width, height, channels, and the floats in `data`: [y][x][channel]
+
+std::atomic<bool> stop{false};
 
 int main(int argc, char** argv) try {
   if (argc != 4) return std::fprintf(stderr, "denoise_arrays RENDER.exr OTHER_SEED.exr OUT.exr\n"), 2;
@@ -45,7 +49,10 @@ int main(int argc, char** argv) try {
       if (finding.severity == covary::Finding::Severity::kWarning)
         std::fprintf(stderr, "warning: %s\n", finding.text.c_str());
   };
+  request.stop = &stop;
+  std::signal(SIGINT, [](int) { stop = true; });  // or any other thread
   covary::CombinedImage combined = covary::combine(request);
+  if (combined.interrupted) return std::fprintf(stderr, "denoise_arrays: stopped\n"), 130;
 
   if (!combined.image.note.empty()) std::printf("%s\n", combined.image.note.c_str());
   if (const auto& error = combined.predicted) {
@@ -53,7 +60,8 @@ int main(int argc, char** argv) try {
     if (error->bounds) std::printf(" (80 %%: %.3g to %.3g)", error->bounds->low, error->bounds->high);
     std::printf("%s%s\n", error->doubt.empty() ? "" : ", but ", error->doubt.c_str());  // why it may be wrong
   }
-  covary::write_result(argv[3], request.independent.origin.place, {}, combined.image, combined.layers);
+  covary::write_result(argv[3], request.independent.origin.place, {{"covary:estimator", request.estimator.text}},
+                       combined.image, combined.layers);
   return 0;  // the picture is combined.image.estimate, its standard error combined.image.std_error
 } catch (const std::exception& error) {
   std::fprintf(stderr, "denoise_arrays: %s\n", error.what());
