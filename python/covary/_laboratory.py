@@ -23,7 +23,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _covary
-from ._arguments import checked, either, function, instance, list_of, mapping_of, optional, path, text
+from ._arguments import (
+    checked, either, function, instance, list_of, make_last_folder, mapping_of, optional, path, text,
+)
 from ._combine import PROGRESS
 from ._identity import Unknown, identity_of
 from ._images import read_image
@@ -39,6 +41,9 @@ if TYPE_CHECKING:
 _CALL = Path(__file__).with_name("_call.py")
 _SOCKET = "COVARY_METHODS"
 _MOST_TICKS = 6
+#: Of plot(): of methods, and of scenes.
+_COLOURS = [f"C{i}" for i in range(10)] + ["navy", "darkgreen", "maroon", "goldenrod", "black"]
+_MARKERS, _LINES = "osD^vP*X", ["-", "--", ":", "-."]
 
 
 @dataclass(frozen=True)
@@ -105,13 +110,14 @@ class Experiment:
 
     @property
     def table(self) -> list[dict[str, Any]]:
-        """A dictionary for each scene, method and budget, for `pandas.DataFrame(found.table)`: its errors with their
-        95 % intervals, ratios of the baseline's error to its own, and seconds, by the clock and of the processor."""
+        """A dictionary for each scene, method and budget (in the unit "spp" or "seconds"), for
+        `pandas.DataFrame(found.table)`: its errors with their 95 % intervals, ratios of the baseline's error to its
+        own, and the seconds that it took, by the clock and of the processor."""
         rows = []
         for cell in self.results["cells"]:
             (unit, budget), = cell["budget"].items()
-            row = {"scene": cell["scene"], "method": cell["method"], unit: budget,
-                   "samples_per_pixel": cell["samples_per_pixel"]}
+            row = {"scene": cell["scene"], "method": cell["method"], "budget": budget, "unit": unit,
+                   "spp": budget if unit == "spp" else None, "samples_per_pixel": cell["samples_per_pixel"]}
             for name in ("relmse", "flip", "equal_sample", "equal_time", "equal_processor_time"):
                 known = cell[name]
                 row |= {name: known["value"], f"{name}_low": known["low"], f"{name}_high": known["high"]}
@@ -122,22 +128,33 @@ class Experiment:
 
     @checked(axes=AXES)
     def plot(self, axes: Any = None) -> Any:
-        """Draws relMSE against samples per pixel, a line for each scene and method, into axes of matplotlib, by default
-        new ones, and returns them."""
+        """Draws relMSE against samples per pixel with its 95 % intervals, a colour for each method, a marker and kind
+        of line for each scene, into axes of matplotlib, by default new ones, and returns them. Budgets in seconds are
+        points without lines."""
         axes = new_axes() if axes is None else axes
-        lines: dict[str, list[tuple[float, float]]] = {}
+        lines: dict[tuple[str, str, str], list[tuple[float, float, float, float]]] = {}
         for row in self.table:
-            if row["relmse"] and row["relmse"] > 0:
-                lines.setdefault(f"{row['scene']}, {row['method']}", []).append(
-                    (row["samples_per_pixel"], row["relmse"]))
-        for name, points in lines.items():
-            axes.plot(*zip(*sorted(points), strict=True), marker="o", label=name)
+            error = row["relmse"]
+            if error and error > 0:
+                below, above = (abs(error - (error if row[end] is None else max(row[end], error / 100)))
+                                for end in ("relmse_low", "relmse_high"))
+                lines.setdefault((row["scene"], row["method"], row["unit"]), []).append(
+                    (row["samples_per_pixel"], error, below, above))
+        scenes, methods = (list(dict.fromkeys(key[i] for key in lines)) for i in (0, 1))
+        for (scene, method, unit), points in lines.items():
+            x, y, below, above = zip(*sorted(points), strict=True)
+            s, m = scenes.index(scene), methods.index(method)
+            name = scene if len(methods) == 1 else method if len(scenes) == 1 else f"{scene}, {method}"
+            axes.errorbar(x, y, (below, above), color=_COLOURS[m % len(_COLOURS)], marker=_MARKERS[s % len(_MARKERS)],
+                          linestyle=_LINES[s % len(_LINES)] if unit == "spp" else "none", capsize=2,
+                          label=name if unit == "spp" else f"{name}, by time")
+        lines = {key: points for key, points in lines.items() if key[2] == "spp"}
         axes.set(xscale="log", yscale="log", xlabel="samples per pixel", ylabel="relMSE")
-        counts = sorted({x for points in lines.values() for x, _ in points})
+        counts = sorted({point[0] for points in lines.values() for point in points})
         if 0 < len(counts) <= _MOST_TICKS:
             axes.set_xticks(counts, [f"{count:g}" for count in counts])
             axes.set_xticks([], minor=True)
-        axes.legend()
+        axes.legend(fontsize="small", framealpha=0.5)
         return axes
 
     def __repr__(self) -> str:
@@ -250,10 +267,23 @@ class _Runs:
         self._told = done, total
 
 
-def _watcher(progress: Progress | None) -> Line | _Runs | None:
-    """What gets the program's lines: shows them, or where nobody watches tells the numbers of runs."""
-    if is_default(progress) and is_watched():
-        return Line()
+class _Log:
+    """Prints the program's lines where nobody watches, one for each run."""
+
+    def __init__(self) -> None:
+        self._run = ""
+
+    def __call__(self, text: str) -> None:
+        found = re.match(r"\[(\d+)/", text)
+        if found and found[1] != self._run:
+            self._run = found[1]
+            print(text, file=sys.stderr, flush=True)
+
+
+def _watcher(progress: Progress | None) -> Line | _Log | _Runs | None:
+    """What gets the program's lines: shows them, or tells the numbers of runs."""
+    if is_default(progress):
+        return Line() if is_watched() else _Log()
     counted = steps(progress, "runs")
     return None if counted is None else _Runs(counted)
 
@@ -273,7 +303,8 @@ def experiment(suite: str | PathLike[str] | dict[str, Any], output: str | PathLi
     """Compares methods over scenes, budgets and seeds, as `covary experiment` does; methods may be Python functions.
 
     suite: the name of a built-in suite, a suite's or a scene's file, or a suite as a dictionary (docs/experiments.md).
-    output: folder for the report and the results; finished runs in it are not repeated.
+    output: folder for the report and the results, and for suite-of-python.json if the suite is a dictionary; finished
+        runs in it are not repeated.
     methods: functions by name. Each gets Samples and returns an image, [H, W, 3], linear. A method of the suite says
         by "program": NAME what it renders for it; functions that none refers to get independent samples in eight
         groups, with auxiliary features. They are called one after the other, in another thread, and what they take
@@ -297,9 +328,10 @@ def experiment(suite: str | PathLike[str] | dict[str, Any], output: str | PathLi
     if scenes is not None:
         words += ["--scenes", fspath(scenes)]
     with tempfile.TemporaryDirectory(prefix="covary-suite-") as folder, _served(given):
-        made_file = Path(folder) / "suite.json"
+        made_file = Path(output if isinstance(suite, dict) else folder) / "suite-of-python.json"
         if isinstance(suite, dict):
-            made_file.write_text(json.dumps(suite), encoding="utf-8")
+            make_last_folder(made_file)
+            made_file.write_text(json.dumps(suite, indent=2) + "\n", encoding="utf-8")
             words += ["--scenes", os.getcwd()] if scenes is None else []
             suite = made_file
         watcher = _watcher(progress)

@@ -68,6 +68,8 @@ Json methods_table(const Suite& suite) {
   Json rows = Json::array();
   for (const MethodEntry& method : suite.methods) {
     std::string options = fmt::format("{}", fmt::join(method.options, " "));
+    if (!method.program.empty())
+      options += (options.empty() ? "" : " | ") + fmt::format("program or function '{}'", method.program);
     for (const auto& step : method.then) options += fmt::format(" | covary {}", fmt::join(step, " "));
     rows.push_back({{"name", method.name}, {"options", options}});
   }
@@ -305,8 +307,12 @@ std::vector<std::string> verdicts(const Results& results, size_t budget) {
           verdict(results, b, fmt::format("At equal samples ({})", budgets[b].label()), &Summary::equal_sample));
   if (of.spp > 0)
     all.push_back(verdict(results, budget, fmt::format("At equal samples ({})", of.label()), &Summary::equal_sample));
-  all.push_back(verdict(results, budget,
-                        fmt::format("At equal time ({}{})", of.spp > 0 ? "measured with " : "", of.label()),
+  size_t timed = budget;  // a time limit, if there is one, rather than the time that samples took
+  for (size_t b = 0; b < budgets.size() && of.spp > 0; ++b)
+    if (budgets[b].spp == 0) timed = b;
+  const Budget& of_time = budgets[timed];
+  all.push_back(verdict(results, timed,
+                        fmt::format("At equal time ({}{})", of_time.spp > 0 ? "measured with " : "", of_time.label()),
                         &Summary::equal_time));
   all.push_back(flip_verdict(results, budget));
   std::erase(all, "");

@@ -107,7 +107,7 @@ class Experiments(PackageTest):
         self.assertEqual(told[-1], (4, 4))
         with contextlib.redirect_stderr(said):
             covary.experiment(SUITE, self.path / "log", scenes=ROOM.parent, progress=True)
-        self.assertRegex(said.getvalue(), r"^(runs: \d of 4\n)*runs: 4 of 4\n$")
+        self.assertRegex(said.getvalue(), r"^(\[\d/4.*\] room, .*\n)+$")
 
     def test_line_on_a_terminal(self):
         """From the beginning, and not asked for."""
@@ -139,19 +139,20 @@ class Experiments(PackageTest):
     def test_plot(self):
         class Axes:
             lines = []
-            def plot(self, x, y, **style):
+            def errorbar(self, x, y, bars, **style):
+                assert min(bars[0]) >= 0 and max(bars[0]) < min(y)
                 self.lines.append((x, style["label"]))
             def set(self, **words):
                 self.words = words
             def set_xticks(self, places, labels=(), minor=False):
                 if not minor:
                     self.ticks = places, labels
-            def legend(self):
+            def legend(self, **style):
                 pass
             imshow = None
 
         axes = self.experiment().plot(Axes())
-        self.assertEqual((axes.lines, axes.words["yscale"]), ([((16.0,), "room, pt")], "log"))
+        self.assertEqual((axes.lines, axes.words["yscale"]), ([((16.0,), "room")], "log"))
         self.assertEqual(axes.ticks, ([16.0], ["16"]))
 
     def test_pixels_that_are_not_finite_are_told(self):
