@@ -161,7 +161,8 @@ std::string ProgressLine::bar_text(int columns) const {
   const double fraction = std::clamp(std::max(done, limit_used), 0.0, 1.0);
   const double left = total ? static_cast<double>(total - std::min(done_, total)) / rate : kUnknown;
   const std::string percent = fmt::format("{:.0f} %", 100 * fraction);
-  const std::string until = format_duration(all_left(left + later_units_ / rate)) + " left" + note();
+  const std::string until = fmt::format("{}{} left{}", goal_ > 0 ? "at least " : "",
+                                        format_duration(all_left(left + later_units_ / rate)), note());
   const std::string start = fmt::format("{}: {} ", label_, phase_);
   if (!terminal_) return fmt::format("{}{}, {}", start, percent, until);
   const std::string end = fmt::format(" {:>5}  {}", percent, until);

@@ -84,6 +84,11 @@ RenderResult render_watched(const RenderOptions& options, const LoadedScene& sce
     progress.clear();
     fmt::print(stderr, "warning: {}\n", as_options(text));
   };
+  callbacks.resumed = [&](double samples) {
+    progress.clear();
+    if (!options.quiet)
+      fmt::print(stderr, "note: continues with the {} that are kept\n", samples_per_pixel_text(samples));
+  };
   const Plan plan = make_plan(options);
   RenderResult result =
       live ? live->render(scene, plan, request, callbacks) : covary::render(scene, plan, request, callbacks);

@@ -17,6 +17,7 @@
 #include "core/known_names.h"
 #include "core/shell_text.h"
 #include "declared_options.h"
+#include "io/default_sensor.h"
 #include "io/scene_formats.h"
 #include "method_options.h"
 #include "numbers.h"
@@ -113,6 +114,8 @@ LoadedScene load(const RenderOptions& options) {
   loading.make_integrator = integrator_maker({options.settings.integrator, options.of_integrator});
   LoadedScene scene = load_scene(options.scene, loading);
   check_integrator(options, scene);
+  if (!options.sequence.camera_path.empty())  // which says where the camera is
+    std::erase_if(scene.warnings, [](const std::string& text) { return text.find(kFramed) != std::string::npos; });
   for (std::string& warning : integrator_of(scene).blind_spots(*scene.scene))
     scene.warnings.push_back(std::move(warning));
   return scene;

@@ -93,8 +93,9 @@ std::string next_text(const RenderReport& report, const PhaseTimes& times) {
   const bool is_fixed =
       times.auxiliary + times.estimate > kMostOfTheTime * times.total() && times.total() > kLongSeconds;
   if (is_fixed && result.predicted && o.request().until <= 0)
-    return fmt::format("`--spp {:g}` takes much less than four times as long: most of this time was not for samples",
-                       4 * std::round(result.samples_per_pixel()));
+    return fmt::format(
+        "`--spp {:g} --overwrite` takes much less than four times as long: most of this time was not for samples",
+        4 * std::round(result.samples_per_pixel()));
   if (!o.request().passes.empty())
     return fmt::format("`--resume --spp {:g}` adds to the samples in {}", 4 * std::round(result.samples_per_pixel()),
                        shell_text({o.request().passes}));
@@ -161,7 +162,8 @@ void print_summary(const RenderReport& report) {
   fmt::print(stderr, "{}: {} x {} pixels, {}{}\n", request.output, result.passes[0].film.width(),
              result.passes[0].film.height(), samples_text(result),
              request.preview ? "; " + preview_path(request.output) + " to look at" : "");
-  fmt::print(stderr, "time: {}\nhow good: {}\n", text_of(times, estimate_name(options)), quality_text(report));
+  fmt::print(stderr, "time: {}{}\nhow good: {}\n", text_of(times, estimate_name(options)),
+             request.resume ? " (of all calls)" : "", quality_text(report));
   if (const std::string next = next_text(report, times); !next.empty()) fmt::print(stderr, "next: {}\n", next);
 }
 

@@ -82,6 +82,13 @@ RenderResult PlanRun::run() {
   return std::move(result_);
 }
 
+void PlanRun::tell_resumed(std::span<const Pass> passes) {
+  if (std::exchange(has_told_resumed_, true) || !callbacks_.resumed) return;
+  double samples = 0;
+  for (const Pass& pass : passes) samples += pass.film.mean_count();
+  if (samples > 0) callbacks_.resumed(samples);
+}
+
 void PlanRun::warn_of_missing_light() const {
   if (plan_.traces_light || !scene_.has_delta_lights_and_surfaces || !callbacks_.warning ||
       !integrator_->light_tracing())
@@ -187,6 +194,7 @@ bool PlanRun::render_phase(size_t index, double share) {
   if (request_.resume && !timed() && request_.until == 0) check_earlier_samples(camera_passes(passes));
   if (passes.back().plan.light) set_light_target(*state_.integrator, camera_passes(state_.passes), passes.back());
   for (Pass& pass : passes) pass.count = pass.settings.spp.reached(pass.film);
+  if (request_.resume && index == 0 && done_ == 0) tell_resumed(camera_passes(passes));
   if (index + 1 == plan_.phases.size() && !timed() && request_.until == 0) warn_of_other_samples(state_.budget);
   begin(RenderStage::kRendering);
   WaveLimits limits;

@@ -60,6 +60,7 @@ class PlanRun {
   std::span<Pass> films() { return result_.passes.empty() ? state_.passes : result_.passes; }
   void warn_of_other_samples(uint32_t asked) const;
   void check_earlier_samples(std::span<const Pass> passes) const;
+  void tell_resumed(std::span<const Pass> passes);
   void warn_of_missing_light() const;
   void warn_of_other_sampler() const;
   bool estimate();
@@ -143,7 +144,8 @@ class PlanRun {
   std::shared_ptr<Integrator> of_layers_;  // with RenderRequest::splits_layers(), like the two below
   std::vector<std::string> layer_names_;
   std::vector<Film> layers_;  // with these names; empty until traced
-  uint64_t done_ = 0;         // samples of this call, of earlier phases and rounds
+  bool has_told_resumed_ = false;
+  uint64_t done_ = 0;  // samples of this call, of earlier phases and rounds
   Stopwatch watch_, since_checkpoint_;
   bool consistent_ = true;                        // the films are in the state between two waves
   bool unsaved_ = false;                          // they have samples that have not been written

@@ -40,6 +40,8 @@ struct RenderCallbacks {
   /// Between waves, when films may be read; about twice a second in passes of a single wave.
   std::function<void(std::span<const Pass>)> wave;
   std::function<void(const std::string&)> warning;
+  /// With `resume`: samples per pixel, of all passes of camera samples, that earlier calls had taken.
+  std::function<void(double samples)> resumed;
 
   // For somebody who watches. None of these changes the bits of an image with the same samples.
   /// Waves of 1, 2, 4, … samples per pixel, of about a second at most, so that there is soon something to see.

@@ -76,7 +76,7 @@ class Progress(CliTest):
         bounds = [tuple(map(float, found)) for found in re.findall(known, text) if found[1]]
         self.assertTrue(bounds, text)
         self.assertTrue(all(low < middle < high for middle, low, high in bounds), bounds)
-        self.assertRegex(text, r"\d %  \d+:\d\d left  relMSE ")
+        self.assertRegex(text, r"\d %  at least \d+:\d\d left  relMSE ")
         text = self.shown(*RENDER, "--estimator", "iicv", "--spp", "48", "-o", "b.exr", columns=120)
         self.assertRegex(text, r"writing  relMSE [0-9.e-]+ \([^)]+\)(?!, goal)")
 
