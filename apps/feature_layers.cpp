@@ -152,9 +152,12 @@ FeatureLayers::FeatureLayers(const FeatureSearch& search, bool are_groups) {
   const auto add = [&](feature::Index kind, FeatureKind of_file, const std::string& name) {
     for (const std::string& path : search.files) {
       const ImageInfo info = inspect_image(path);
-      features_.add(kind, path,
-                    name.empty() ? find_feature(path, info, of_file, search.colours, search.picture)
-                                 : named_feature(path, info, of_file, search.colours, name));
+      std::optional<Image> feature = name.empty() ? find_feature(path, info, of_file, search.colours, search.picture)
+                                                  : named_feature(path, info, of_file, search.colours, name);
+      std::optional<PlacedImage> picture;
+      if (are_groups && !are_own_ && feature && feature_of(of_file).is_colour)
+        picture = read_image(path, search.picture.layer, ChecksumPolicy::kCheck, std::nullopt);
+      features_.add(kind, path, std::move(feature), picture ? &picture->image : nullptr);
     }
     features_.close(kind);
   };

@@ -63,7 +63,8 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, l
         or "none" if another estimator is named. albedo, normal, position: features [H, W, 3], the others only with the
         albedo; denoising_albedo, denoising_normal: features seen through mirrors and glass (from render():
         aovs["Albedo"], "N", "P", "DenoisingAlbedo", "DenoisingNormal"). Features of the picture's own samples have
-        noise, which would pass for detail: give those of each render, [T, H, W, 3] or a list. clean_features: they are
+        noise, which would pass for detail: give those of each render, [T, H, W, 3] or a list. Lamps in the picture,
+        which renderers give the albedo of their material, become black in it. clean_features: they are
         nearly noise-free, as those of render() are, whose image `films` then give again; oidn: Open Image Denoise's
         library or its folder, by default searched for; "off": not used.
     layers: parts of `independent` by name, such as direct light, in the same groups: denoised with it, they are in the

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <deque>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <span>
@@ -178,8 +179,21 @@ DenoisingChoice denoising_of(const std::string& estimator, const std::string& mo
   return settings_from<DenoisingChoice>(values);
 }
 
+constexpr size_t kAll = std::numeric_limits<size_t>::max();
+
+/// The mean of a group's samples, or of all.
+Image picture_of(const GroupedImage& image, size_t group) {
+  Image picture(image.width, image.height, 3);
+  const auto groups = static_cast<size_t>(image.groups);
+  const size_t first = group == kAll ? 0 : group, end = group == kAll ? groups : group + 1;
+  for (size_t i = 0; i < picture.data.size(); ++i)
+    for (size_t g = first; g < end; ++g)
+      picture.data[i] += image.data[3 * (i / 3 * groups + g) + i % 3] / static_cast<float>(end - first);
+  return picture;
+}
+
 /// The features of --denoise: of all renders, or [T, H, W, 3] of each.
-RenderFeatures features_from(const ExtraInputs& beside, const Method& estimator, const Input& image) {
+RenderFeatures features_from(const ExtraInputs& beside, const Method& estimator, Input& image) {
   const std::string shape = fmt::format("{}, {}, 3", image.height(), image.width());
   const std::pair<const nb::object&, feature::Index> arrays[] = {{beside.albedo, feature::kAlbedo},
                                                                  {beside.normal, feature::kNormal},
@@ -194,8 +208,12 @@ RenderFeatures features_from(const ExtraInputs& beside, const Method& estimator,
       throw Error(ErrorCode::kUsage, name +
                                          ": auxiliary features are for denoising, with denoise='auto', 'bias', "
                                          "'balanced' or 'error'");
-    for (Image& of_render : images_of(array, name, image.groups(), shape))
-      features.add(kind, name, std::move(of_render));
+    std::vector<Image> renders = images_of(array, name, image.groups(), shape);
+    for (size_t i = 0; i < renders.size(); ++i) {
+      const bool has_lamps = kAuxiliaryFeatures[kind].is_colour && !beside.clean_features;  // as renderers show them
+      const Image picture = has_lamps ? picture_of(image.view(), renders.size() > 1 ? i : kAll) : Image();
+      features.add(kind, name, std::move(renders[i]), has_lamps ? &picture : nullptr);
+    }
   }
   const auto needs = [&](feature::Index kind, feature::Index other, const char* other_name) {
     if (!features.has(kind) || features.has(other)) return;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "denoising/lamps.h"
 
 namespace covary {
 namespace {
@@ -75,9 +76,11 @@ std::array<float, 2> MeanFeature::factors() const {
   return {static_cast<float>(n_images_[1]) / n, -static_cast<float>(n_images_[0]) / n};
 }
 
-void RenderFeatures::add(feature::Index kind, const std::string& name, std::optional<Image> image) {
+void RenderFeatures::add(feature::Index kind, const std::string& name, std::optional<Image> image,
+                         const Image* picture) {
   COVARY_CHECK(!images_[kind], "features are added before they are used");
   if (image && kAuxiliaryFeatures[kind].is_colour) limit_albedo(*image);
+  if (image && picture && kAuxiliaryFeatures[kind].is_colour && image->channels == 3) darken_lamps(*picture, *image);
   sums_[kind].add(name, std::move(image));
 }
 

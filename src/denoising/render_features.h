@@ -52,8 +52,9 @@ class RenderFeatures {
   explicit RenderFeatures(bool are_of_groups = true) : are_of_groups_(are_of_groups) {}
 
   /// The feature of the next render, as MeanFeature::add() takes it. An albedo is limited to [0, 1]: renderers that
-  /// estimate it by a sample, such as Mitsuba on rough metal, write 100 and more.
-  void add(feature::Index kind, const std::string& name, std::optional<Image> image);
+  /// estimate it by a sample, such as Mitsuba on rough metal, write 100 and more. With the render's `picture`, it is
+  /// darkened where that shows lamps (lamps.h).
+  void add(feature::Index kind, const std::string& name, std::optional<Image> image, const Image* picture = nullptr);
   /// Nothing more of this kind is added: gives memory back.
   void close(feature::Index kind);
   /// What was added, of all samples and of halves; without an albedo, there is no normal. Nothing may be added after

@@ -87,6 +87,17 @@ TEST(AuxiliaryImages, APaneShowsTheWallBehind) {
   expect_constant(images.at("DenoisingAlbedo"), {0.2f, 0.4f, 0.8f});
 }
 
+TEST(AuxiliaryImages, WhatShinesIsDarkAlsoInMirrors) {
+  const auto lamp = [](const char* radiance) {
+    return diffuse("0.8, 0.4, 0.4") + "<emitter type='area'><rgb name='radiance' value='" + radiance + "'/></emitter>";
+  };
+  expect_constant(images_of(wall(5, lamp("0.2, 0.8, 0"))).at("Albedo"), {0.4f, 0.2f, 0.2f});
+  const auto images = images_of(wall(5, mirror("0.5")) + wall(-5, lamp("800"), true));
+  expect_constant(images.at("DenoisingAlbedo"), {0, 0, 0});
+  expect_constant(images.at("Albedo"), {0.5f, 0.5f, 0.5f});
+  expect_constant(images_of(wall(5, lamp("800"), true)).at("Albedo"), {0.8f, 0.4f, 0.4f});  // its dark side
+}
+
 TEST(AuxiliaryImages, AMirrorOfTheSkyIsEmpty) {
   const auto images = images_of(wall(5, mirror("1")));
   expect_constant(images.at("DenoisingAlbedo"), {0, 0, 0});

@@ -28,7 +28,7 @@ int main(int argc, char** argv) try {
   // Of each render: the noise of their mean, which is that of the picture's own samples, would pass for detail.
   covary::RenderFeatures features;
   for (const int file : {1, 2}) {
-    features.add(covary::feature::kAlbedo, argv[file], layer(file, "Albedo"));
+    features.add(covary::feature::kAlbedo, argv[file], layer(file, "Albedo"), &renders[file - 1]);
     features.add(covary::feature::kNormal, argv[file], layer(file, "N"));
   }
 
