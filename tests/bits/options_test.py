@@ -21,6 +21,8 @@ NETWORK = ("--oidn", os.environ["STAND_IN_DENOISER"])
 FILTERS = ("--oidn", "off")
 GUIDES = ("--features", "features.exr")
 MODES = ("auto", "bias", "balanced", "error")
+#: Of a method's options, only each so many-th is tried, others for the next method.
+STEP = int(os.environ.get("OPTIONS_STEP", "1"))
 
 #: Methods that combine a pair: words of the program.
 PAIR = [
@@ -91,6 +93,8 @@ def bits(channels, layer=""):
 class OptionsTest(CliTest):
     """The images that `combine` gets are written once."""
 
+    n_checked = 0
+
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
@@ -131,7 +135,8 @@ class OptionsTest(CliTest):
         """Runs `command` plainly and with each of `options`; images and their errors must agree."""
         self.good(*command)
         images = {"": bits(self.read())}
-        for more in options:
+        self.n_checked += 1
+        for more in options[self.n_checked % STEP::STEP]:
             with self.subTest(" ".join((*command, *more))):
                 self.good(*command, *more)
                 channels = self.read()
@@ -153,7 +158,7 @@ class Combine(OptionsTest):
             options = OPTIONS + BANDS + EXPLAINED if with_variates else [
                 more for more in OPTIONS if "--error" not in more]
             images = self.check((*self.COMMAND, *method), options)
-            self.assertEqual("StdError." in images, with_variates)
+            self.assertEqual("StdError." in images, with_variates and (STEP == 1 or "StdError." in images))
             different.add(images[""])
         self.assertEqual(len(different), len(PAIR))
 
