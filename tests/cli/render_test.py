@@ -238,8 +238,8 @@ class Plans(RenderTest):
 
     def test_any_split_gives_the_bits_of_one_go(self):
         for options in (["--estimator", "none"], ["--estimator", "none", "--groups", "5"], ["--oidn", "off"], [*IICV]):
-            self.statistics("-o", "whole.exr", "--spp", "200", "--passes", "whole", *options)
-            for spp in ("70", "100", "113", "200"):
+            self.statistics("-o", "whole.exr", "--spp", "100", "--passes", "whole", *options)
+            for spp in ("35", "50", "57", "100"):
                 self.statistics("-o", "part.exr", "--spp", spp, "--passes", "part", "--resume", *options,
                                 *([] if "none" in options else ["--groups", "10"]))
             self.same("part.exr", "whole.exr")
@@ -248,14 +248,14 @@ class Plans(RenderTest):
                     file.unlink()
 
     def test_until(self):
-        facts = self.statistics("-o", "a.exr", *IICV, "--until", "relmse=0.0015")
-        self.assertLessEqual(facts["predicted_relmse"], 0.0015)
-        self.assertGreater(facts["samples_per_pixel"], 96)
+        facts = self.statistics("-o", "a.exr", *IICV, "--until", "relmse=0.003")
+        self.assertLessEqual(facts["predicted_relmse"], 0.003)
+        self.assertGreater(facts["samples_per_pixel"], 48)
         self.good("render", ROOM, *SMALL, "-o", "b.exr", *IICV, "--spp",
                   str(int(facts["samples_per_pixel"])))
         self.same("a.exr", "b.exr")
-        self.assertLessEqual(self.statistics("-o", "c.exr", "--until", "relmse=0.001", "--oidn", "off")
-                             ["predicted_relmse"], 0.001)
+        self.assertLessEqual(self.statistics("-o", "c.exr", "--until", "relmse=0.002", "--oidn", "off")
+                             ["predicted_relmse"], 0.002)
         facts = self.statistics("-o", "d.exr", "--until", "relmse=0.02", "--estimator", "none")
         self.assertLessEqual(facts["predicted_relmse"], 0.02)
 
