@@ -130,7 +130,7 @@ class Experiment:
     def plot(self, axes: Any = None) -> Any:
         """Draws relMSE against samples per pixel with its 95 % intervals, a colour for each method, a marker and kind
         of line for each scene, into axes of matplotlib, by default new ones, and returns them. Budgets in seconds are
-        points without lines."""
+        hollow points without lines."""
         axes = new_axes() if axes is None else axes
         lines: dict[tuple[str, str, str], list[tuple[float, float, float, float]]] = {}
         for row in self.table:
@@ -141,20 +141,23 @@ class Experiment:
                 lines.setdefault((row["scene"], row["method"], row["unit"]), []).append(
                     (row["samples_per_pixel"], error, below, above))
         scenes, methods = (list(dict.fromkeys(key[i] for key in lines)) for i in (0, 1))
+        named: set[str] = set()
         for (scene, method, unit), points in lines.items():
             x, y, below, above = zip(*sorted(points), strict=True)
             s, m = scenes.index(scene), methods.index(method)
             name = scene if len(methods) == 1 else method if len(scenes) == 1 else f"{scene}, {method}"
             axes.errorbar(x, y, (below, above), color=_COLOURS[m % len(_COLOURS)], marker=_MARKERS[s % len(_MARKERS)],
                           linestyle=_LINES[s % len(_LINES)] if unit == "spp" else "none", capsize=2,
-                          label=name if unit == "spp" else f"{name}, by time")
+                          markerfacecolor=None if unit == "spp" else "none",
+                          label=None if name in named else name)
+            named.add(name)
         lines = {key: points for key, points in lines.items() if key[2] == "spp"}
         axes.set(xscale="log", yscale="log", xlabel="samples per pixel", ylabel="relMSE")
         counts = sorted({point[0] for points in lines.values() for point in points})
         if 0 < len(counts) <= _MOST_TICKS:
             axes.set_xticks(counts, [f"{count:g}" for count in counts])
             axes.set_xticks([], minor=True)
-        axes.legend(fontsize="small", framealpha=0.5)
+        axes.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.02, 1))  # beside the axes
         return axes
 
     def __repr__(self) -> str:

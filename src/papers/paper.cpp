@@ -162,7 +162,7 @@ Paper parse_paper(const std::string& text, const std::string& name) {
 std::vector<PreparedPart> prepare_parts(const Paper& paper, const Words& only, const std::string& folder,
                                         const std::string& own_folder, const Overrides& overrides) {
   std::vector<PreparedPart> parts;
-  std::set<std::string> scenes, methods;
+  std::set<std::string> scenes, methods, missing;
   for (const PaperPart& part : chosen(paper, only)) {
     PreparedPart prepared{part, builtin_suite(part.suite), {}, false};
     if (part.seconds > 0) prepared.suite.budgets = {{0, part.seconds}}, prepared.suite.show.reset();
@@ -170,6 +170,8 @@ std::vector<PreparedPart> prepare_parts(const Paper& paper, const Words& only, c
     if (own.quick) own.quick = part.quick;
     locate(paper, folder, own_folder, prepared);
     of_suite(overrides.scenes, prepared.missing, scenes);
+    for (const SceneEntry& scene : prepared.missing)
+      if (std::ranges::find(overrides.scenes, scene.name) != overrides.scenes.end()) missing.insert(scene.file);
     own.scenes = of_suite(overrides.scenes, prepared.suite.scenes, scenes);
     own.methods = of_suite(overrides.methods, prepared.suite.methods, methods);
     if (own.scenes.empty() != overrides.scenes.empty() || own.methods.empty() != overrides.methods.empty()) continue;
@@ -179,7 +181,12 @@ std::vector<PreparedPart> prepare_parts(const Paper& paper, const Words& only, c
   throw_if_unknown("scene", overrides.scenes, scenes);
   throw_if_unknown("method", overrides.methods, methods);
   if (parts.empty())
-    throw Error(ErrorCode::kUsage, "no part of the paper has a scene that is at hand, and a method, of those named");
+    throw Error(ErrorCode::kUsage,
+                fmt::format("no part of the paper has a scene that is at hand, and a method, of those named{}",
+                            missing.empty() ? ""
+                                            : fmt::format("; --scenes FOLDER with {} is needed (`covary scenes` says "
+                                                          "where they are from)",
+                                                          fmt::join(missing, ", "))));
   return parts;
 }
 
