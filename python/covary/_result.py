@@ -138,6 +138,7 @@ class Result:
         samples = "" if self.samples_per_pixel is None else f"{self.samples_per_pixel:g} samples per pixel"
         facts = [f"{width} x {height}", samples, self.estimator,
                  relmse_text(self.predicted_relmse, self.predicted_bounds, self.prediction_doubt),
+                 "" if getattr(self, "until_reached", True) is not False else "until not reached",
                  f"{len(self.warnings)} warning{'s' if len(self.warnings) > 1 else ''}" if self.warnings else ""]
         return f"<covary.{type(self).__name__} {', '.join(fact for fact in facts if fact)}>"
 

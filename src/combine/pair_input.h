@@ -19,15 +19,15 @@ namespace covary {
 
 /// What is known about an image besides its pixels; unknown texts are empty.
 struct ImageOrigin {
-  std::string name;  ///< for messages
-  ImagePlace place;
-  std::string sampling;              ///< attribute of films: "crn", "independent"
-  std::string scene_hash, settings;  ///< attributes of films
-  bool has_half = false;             ///< a channel has only 16 bits
-  bool is_light_film = false;        ///< film/splat_layer.h
-  bool has_light_added = false;      ///< an image to which a light film was added
-  bool is_one_film = false;          ///< all groups are of one film of covary, and so of different samples
-  std::string denoised;              ///< denoised_by() of film/denoised_by.h
+  std::string name = {};  ///< for messages
+  ImagePlace place = {};
+  std::string sampling = {};                   ///< attribute of films: "crn", "independent"
+  std::string scene_hash = {}, settings = {};  ///< attributes of films
+  bool has_half = false;                       ///< a channel has only 16 bits
+  bool is_light_film = false;                  ///< film/splat_layer.h
+  bool has_light_added = false;                ///< an image to which a light film was added
+  bool is_one_film = false;                    ///< all groups are of one film of covary, and so of different samples
+  std::string denoised = {};                   ///< denoised_by() of film/denoised_by.h
   ColourSpace colours = {};
   std::vector<std::string> renders = {};   ///< files, if each holds one group
   Renderer renderer = Renderer::kUnknown;  ///< that made them

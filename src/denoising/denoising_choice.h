@@ -18,9 +18,9 @@ struct MixingHistory {
 
 struct DenoisingChoice {
   static constexpr const char *kNone = "none", *kAuto = "auto";
-  std::string mode = kNone;  ///< none; auto, error: least error; bias, balanced: less bias, and more noise
-  std::string oidn;          ///< Open Image Denoise's library or its folder; "": search for it, "off": do not use it
-  MixingHistory history;     ///< not an option
+  std::string mode = kNone;    ///< none; auto, error: least error; bias, balanced: less bias, and more noise
+  std::string oidn = {};       ///< Open Image Denoise's library or its folder; "": search for it, "off": do not use it
+  MixingHistory history = {};  ///< not an option
   bool denoises() const { return mode != kNone; }
   bool uses_oidn() const { return denoises() && oidn != "off"; }
 };

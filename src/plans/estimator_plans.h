@@ -23,9 +23,9 @@ Plan samples_plan(const Method& estimator);
 
 /// What a render may choose about an estimator's passes.
 struct PassChoice {
-  Sampling sampling = Sampling::kIndependent;  ///< for estimators whose one pass may be of either kind
-  std::optional<int> groups;                   ///< default: as the plans here choose
-  std::optional<std::array<double, 2>> split;  ///< default: equal
+  Sampling sampling = Sampling::kIndependent;       ///< for estimators whose one pass may be of either kind
+  std::optional<int> groups = {};                   ///< default: as the plans here choose
+  std::optional<std::array<double, 2>> split = {};  ///< default: equal
 };
 
 /// Passes "crn" and "independent" that advance together, and a two-pass estimator. Groups of each: by default
