@@ -177,7 +177,8 @@ class Frames {
     const size_t n_all = n_done_ + kept_.size() + failed_.size() + left.size();
     std::vector<std::string> problems;
     if (!failed_.empty())
-      problems.push_back(fmt::format("{} of {} failed: {}", failed_.size(), counted(n_all, "frame"), text_of(failed_)));
+      problems.push_back(fmt::format("{} of {} failed: {}{}", failed_.size(), counted(n_all, "frame"), text_of(failed_),
+                                     o_.watch ? "; --resume tries again" : ""));
     if (!left.empty())
       problems.push_back(fmt::format("{} of {} incomplete: {}; files of '{}' are missing or unfinished", left.size(),
                                      counted(n_all, "frame"), text_of(left),

@@ -86,16 +86,17 @@ std::shared_ptr<const History> history_of(const HistorySource& from, const Motio
   const std::string before = frame_name(patterns.images[0], frame - 1), now = frame_name(patterns.images[0], frame);
   const MotionLayers layers = read_motion(frame_name(*from.motion, frame), source);
   const MotionLayers old = read_motion(frame_name(*from.motion, frame - 1), source);
-  check_seeds(before, now);
-  if (!is_own_motion(frame_name(*from.motion, frame), source)) check_motion(before, now, from.layer, layers);
   const std::string result = frame_name(patterns.output, frame - 1);
   const PlacedImage earlier = read_image(result, from.layer, ChecksumPolicy::kCheck, std::nullopt);
   for (const Image* image : {&old.depth, &earlier.image})
     if (image->width != layers.depth.width || image->height != layers.depth.height) {
-      fmt::print(stderr, "note: '{}' has another size than '{}', which is denoised without it\n",
-                 image == &earlier.image ? result : before, now);
+      fmt::print(stderr, "warning: '{}' has {} x {} pixels, '{}' {} x {}, which is denoised without it\n",
+                 image == &earlier.image ? result : before, image->width, image->height, now, layers.depth.width,
+                 layers.depth.height);
       return nullptr;
     }
+  check_seeds(before, now);
+  if (!is_own_motion(frame_name(*from.motion, frame), source)) check_motion(before, now, from.layer, layers);
   History history = reproject(earlier.image, old.depth, layers);
   history.of = picture_in(result);
   return std::make_shared<History>(std::move(history));

@@ -19,6 +19,7 @@
 #include "declared_options.h"
 #include "io/default_sensor.h"
 #include "io/scene_formats.h"
+#include "io/sensor.h"
 #include "method_options.h"
 #include "numbers.h"
 #include "passes/light_pass.h"
@@ -114,8 +115,12 @@ LoadedScene load(const RenderOptions& options) {
   loading.make_integrator = integrator_maker({options.settings.integrator, options.of_integrator});
   LoadedScene scene = load_scene(options.scene, loading);
   check_integrator(options, scene);
-  if (!options.sequence.camera_path.empty())  // which says where the camera is
-    std::erase_if(scene.warnings, [](const std::string& text) { return text.find(kFramed) != std::string::npos; });
+  const auto is_settled = [&](const std::string& warning) {  // by options
+    const auto says = [&](const char* text) { return warning.find(text) != std::string::npos; };
+    return (!options.sequence.camera_path.empty() && says(kFramed)) ||
+           (options.request().alpha && says(kAlphaOnDemand));
+  };
+  std::erase_if(scene.warnings, is_settled);
   for (std::string& warning : integrator_of(scene).blind_spots(*scene.scene))
     scene.warnings.push_back(std::move(warning));
   return scene;

@@ -140,8 +140,8 @@ void for_each_image(
   const size_t n_all = n_done + n_kept + failed.size() + left.size();
   std::vector<std::string> problems;
   if (!failed.empty())
-    problems.push_back(
-        fmt::format("{} of {} failed: {}", failed.size(), counted(n_all, "image"), fmt::join(failed, ", ")));
+    problems.push_back(fmt::format("{} of {} failed: {}; --resume tries again", failed.size(), counted(n_all, "image"),
+                                   fmt::join(failed, ", ")));
   if (!left.empty())
     problems.push_back(fmt::format("{} of {} incomplete: {}; unfinished, or missing in one of '{}'", left.size(),
                                    counted(n_all, "image"), fmt::join(left, ", "), fmt::join(inputs, "', '")));

@@ -48,6 +48,7 @@ def motion_layers(points, hit, now, before, fov):
 
 def main(scene_file, path_file, frames, samples=16):
     path = json.load(open(path_file))
+    rate = path.get("frames_per_second", 1)
     scene = mi.load_file(scene_file)
     sensor = scene.sensors()[0]
     parameters = mi.traverse(sensor)
@@ -55,7 +56,7 @@ def main(scene_file, path_file, frames, samples=16):
     integrator = mi.load_dict({"type": "aov", "aovs": "albedo:albedo,sh_normal:sh_normal,p:position",
                                "image": scene.integrator()})
     for frame in range(1, frames + 1):
-        now, before = (camera_at(path, time) for time in (frame, frame - 1))
+        now, before = (camera_at(path, n / rate) for n in (frame, frame - 1))
         parameters["to_world"] = mi.ScalarTransform4f(now)
         parameters.update()
         for seed, name in enumerate("ab"):

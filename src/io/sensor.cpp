@@ -67,7 +67,7 @@ std::shared_ptr<FilmSettings> make_film(Parameters& p) {
   p.get_choice("file_format", "openexr", {"openexr", "exr", "rgbe", "hdr", "pfm"});
   const std::string pixels = p.get_choice("pixel_format", "rgb", kPixelFormats);
   if (pixels == "rgba")
-    p.warn("alpha is written if `--alpha` asks for it");
+    p.warn(kAlphaOnDemand);
   else if (pixels != "rgb")
     p.warn(fmt::format("the image is RGB, not '{}'", pixels));
   p.get_choice("component_format", "float32", {"float16", "float32", "uint32"});

@@ -45,4 +45,7 @@ std::shared_ptr<FilmSettings> make_film(Parameters& parameters);
 std::shared_ptr<SamplerSettings> make_sampler(Parameters& parameters);
 std::shared_ptr<SensorSettings> make_sensor(Parameters& parameters);
 
+/// Told of films with alpha.
+inline constexpr const char* kAlphaOnDemand = "alpha is written if `--alpha` asks for it";
+
 }  // namespace covary
