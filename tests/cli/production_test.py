@@ -218,8 +218,8 @@ class WatchedFolder(CliTest):
         self.assertRegex(result.stderr, r"warning: bad.exr failed: a/bad.exr: .*\(channels: N Z\)")
         self.assertRegex(result.stderr, r"\nshot 1.exr: out/shot 1.exr, predicted relMSE [\d.]+.* \(unreliable: .*\)\n")
         self.assertRegex(result.stderr, r"\n4 images in [\d.]+ s\n")
-        self.assertIn("covary: 1 of 6 images failed: bad.exr; --resume tries again; 1 of 6 images incomplete: half.exr; "
-                      "unfinished, or missing in one of 'a', 'b'\n", result.stderr)
+        self.assertIn("covary: 1 of 6 images failed: bad.exr; --resume tries again; 1 of 6 images incomplete: half.exr;"
+                      " unfinished, or missing in one of 'a', 'b'\n", result.stderr)
         done = ["lamp.EXR", "late.exr", "shot 1.exr", "slow.exr"]
         self.assertEqual(self.written(), done)
         for name in done:
