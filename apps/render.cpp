@@ -215,14 +215,7 @@ bool is_there(const RenderOptions& options, const RenderRequest& request) {
   const MadeFile file = made_file(request.output);
   const std::string& made_of = request.attributes.at(film_key::kMadeOf);
   const bool is_same = file.complete && !file.made_of.empty() && differences(file.made_of, made_of).empty();
-  if (!is_same && !reaches(file, made_of, relmse_goal(request))) {
-    const bool is_replaced = file.complete && differences(file.made_of, made_of, true).empty() &&
-                             asks_for_more(request, file) &&
-                             !inspect_image(request.output).attributes.contains("covary:film");
-    if (is_replaced)
-      fmt::print(stderr, "note: the samples of '{}' were not kept (--passes); all are rendered\n", request.output);
-    return false;
-  }
+  if (!is_same && !reaches(file, made_of, relmse_goal(request))) return false;
   if (const std::string damage = damage_of(request.output); !damage.empty()) {
     fmt::print(stderr, "warning: {}; the picture is rendered again\n", damage);
     return false;

@@ -126,6 +126,16 @@ class FrameTimes {
     if (scene.camera_to_world) return scene.camera_to_world->at(time(frame));
     return std::nullopt;
   }
+  /// What to tell if the path's keys are all before or after the frames; "" otherwise.
+  std::string standstill(const std::vector<int>& frames) const {
+    if (!path_ || frames.size() < 2 || path_->first_time() == path_->last_time()) return "";
+    const double first = time(frames.front()), last = time(frames.back());
+    if (last > path_->first_time() && first < path_->last_time()) return "";
+    return fmt::format(
+        "the camera stands still: the frames are at times {:g} to {:g}, at {:g} per unit of time (--fps), "
+        "and the path's keys at {:g} to {:g}",
+        first, last, rate_, path_->first_time(), path_->last_time());
+  }
   /// Moves everything to its place in the frame.
   void place(int frame, const Transform& camera, LoadedScene& scene) const {
     scene.scene->move_to(time(frame));
@@ -230,6 +240,8 @@ class SequenceRender {
     if (camera.flips_handedness() != own_camera_.flips_handedness())
       fmt::print(stderr, "warning: {}: its cameras mirror the picture; x points to the left\n",
                  options_.sequence.camera_path);
+    if (const std::string still = times_.standstill(frames_); !still.empty())
+      fmt::print(stderr, "warning: {}: {}\n", options_.sequence.camera_path, still);
     if (options_.sequence.history && frames_.size() == 1 && !options_.quiet)
       fmt::print(stderr, "note: the first frame of a command has no history, and --frames {} has no other\n",
                  frames_.front());

@@ -163,7 +163,7 @@ void print_summary(const RenderReport& report) {
              result.passes[0].film.height(), samples_text(result),
              request.preview ? "; " + preview_path(request.output) + " to look at" : "");
   fmt::print(stderr, "time: {}{}\nhow good: {}\n", text_of(times, estimate_name(options)),
-             request.resume ? " (of all calls)" : "", quality_text(report));
+             result.resumed_samples > 0 ? " (of all calls)" : "", quality_text(report));
   if (const std::string next = next_text(report, times); !next.empty()) fmt::print(stderr, "next: {}\n", next);
 }
 

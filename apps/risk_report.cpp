@@ -56,7 +56,8 @@ Quality::Quality(const PredictedError& predicted, const std::optional<MeasuredRi
                      by_few ? " in 95 % of the picture, more in few bright pixels" : "");
   constexpr size_t kShort = 50;
   const std::string& doubt = predicted.doubt;
-  if (!doubt.empty()) text += fmt::format(" (unsure: {})", doubt.size() <= kShort ? doubt : "`--verbose` says why");
+  if (!doubt.empty())
+    text += fmt::format(" (unsure: {})", doubt.size() <= kShort ? doubt : "`covary info` of it says why");
 }
 
 void add_prediction(const PredictedError& predicted, nlohmann::ordered_json& json) {

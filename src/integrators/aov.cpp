@@ -182,8 +182,9 @@ class Round {
   size_t n_met_ = 0;
 };
 
-/// Means over the samples of a pixel: `most`, or as many rounds as it takes to reach kTolerance or kSurfacesPerRay.
-AuxiliarySample auxiliary_means(Round& round, int x, int y, uint32_t most) {
+/// Means over the samples of a pixel: `most`, or as many rounds as it takes to reach kTolerance or kSurfacesPerRay;
+/// those of alpha, if asked for, always over `most`, as a silhouette may be missed by the first.
+AuxiliarySample auxiliary_means(Round& round, int x, int y, uint32_t most, bool alpha) {
   AuxiliarySample sums{}, squares{};
   float largest = kInfinity;  // variance of the means, over albedos and normals
   uint32_t n = 0;
@@ -202,6 +203,10 @@ AuxiliarySample auxiliary_means(Round& round, int x, int y, uint32_t most) {
         largest = std::max(largest, (squares[i][c] - sqr(sums[i][c]) / count) / sqr(count));
   }
   for (Vec3& sum : sums) sum *= 1 / static_cast<float>(n);
+  for (uint32_t end = n; alpha && n < most; n = end) {
+    end = std::min(most, n + kRound);
+    for (const AuxiliarySample& values : round.trace(x, y, n, end)) sums.alpha += values.alpha;
+  }
   sums.alpha /= static_cast<float>(n);
   return sums;
 }
@@ -222,7 +227,7 @@ void render_aovs(const Scene& scene, const PassSettings& pass, uint32_t most, Fi
     if (stopped()) return;
     Round round(scene, settings);
     for (int x = 0; x < film.width(); ++x) {
-      const AuxiliarySample means = auxiliary_means(round, film.crop().x + x, film.crop().y + y, most);
+      const AuxiliarySample means = auxiliary_means(round, film.crop().x + x, film.crop().y + y, most, alpha);
       for (size_t i = 0; i < kImages; ++i)
         for (int c = 0; c < 3; ++c) images[i].pixel(x, y)[c] = means[i][c];
       *alphas.pixel(x, y) = means.alpha;

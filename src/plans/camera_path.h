@@ -22,6 +22,8 @@ class CameraPath {
       : to_world_(std::move(to_world)), frames_per_second_(frames_per_second) {}
   Transform at(double time) const { return to_world_.at(time); }
   double frames_per_second() const { return frames_per_second_; }
+  double first_time() const { return to_world_.first_time(); }
+  double last_time() const { return to_world_.last_time(); }
 
  private:
   KeyedTransform to_world_;

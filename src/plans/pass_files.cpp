@@ -190,10 +190,14 @@ void check_earlier_films(const Plan& plan, const RenderRequest& request) {
   const bool has_films = fs::is_directory(request.passes, ignored) && !fs::is_empty(request.passes, ignored);
   const auto made_of = request.attributes.find(film_key::kMadeOf);
   if (continues || has_films || made_of == request.attributes.end()) return;
-  // Without films, all samples are taken again, which must not make a picture worse.
-  check_made_alike(request.output, made_of->second,
-                   request.resume && (!unfinished.empty() || asks_for_more(request, made_file(request.output))),
-                   request.resume);
+  const MadeFile picture = made_file(request.output);
+  const bool asks = request.resume && unfinished.empty() && asks_for_more(request, picture);
+  check_made_alike(request.output, made_of->second, request.resume && (!unfinished.empty() || asks), request.resume);
+  // Without films, all samples would be taken again, and an interruption would leave a worse picture.
+  if (asks && picture.complete && !picture.made_of.empty())
+    throw Error(ErrorCode::kInput, fmt::format("`resume`: the samples of '{}' were not kept (`passes`); `overwrite` "
+                                               "instead of `resume` renders all",
+                                               request.output));
 }
 
 void take_film_on_disk(const RenderRequest& request, const std::function<void(const std::string&)>& warn, Pass& pass) {

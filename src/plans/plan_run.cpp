@@ -83,10 +83,9 @@ RenderResult PlanRun::run() {
 }
 
 void PlanRun::tell_resumed(std::span<const Pass> passes) {
-  if (std::exchange(has_told_resumed_, true) || !callbacks_.resumed) return;
-  double samples = 0;
-  for (const Pass& pass : passes) samples += pass.film.mean_count();
-  if (samples > 0) callbacks_.resumed(samples);
+  if (std::exchange(has_told_resumed_, true)) return;
+  for (const Pass& pass : passes) result_.resumed_samples += pass.film.mean_count();
+  if (result_.resumed_samples > 0 && callbacks_.resumed) callbacks_.resumed(result_.resumed_samples);
 }
 
 void PlanRun::warn_of_missing_light() const {

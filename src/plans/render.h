@@ -102,6 +102,7 @@ struct RenderResult {
   std::optional<TimeChoice> of_time;  ///< with a time limit, if its image can be made again without one
   std::optional<bool> until_reached;  ///< whether the predicted error reached the target, if there was one
   bool interrupted = false;           ///< by the stop token
+  double resumed_samples = 0;         ///< per pixel, that earlier calls had taken (RenderCallbacks::resumed)
   double preview_stops = 0;           ///< by which the PNG is brighter than the image
   std::string kept;                   ///< after an interruption: the file or folder with the films, empty if none
 

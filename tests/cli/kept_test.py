@@ -289,13 +289,13 @@ class Frames(KeptTest):
         (self.path / "b_4.exr").rename(self.path / "b_6.exr")
         self.image("b_5.exr", (1, 1, 1))
         message = self.bad(1, "b_4.exr", *self.COMMAND).stderr
-        self.assertIn("'b_5.exr' has 4 x 3 pixels at (0, 0), the first frame 16 x 12 at (0, 0)", message)
+        self.assertIn("'b_5.exr' has 4 x 3 pixels at (0, 0), frame 1 has 16 x 12 pixels at (0, 0)", message)
         self.assertIn("a_6.exr", message)
         self.assertIn("nothing was written", message)
         self.assertEqual(self.written(), [])
         self.write("b_5.exr", exr({c: [1] * N for c in "RGB"}, SIZE))
         (self.path / "b_6.exr").rename(self.path / "b_4.exr")
-        self.bad(1, "'b_5.exr': the channel A is missing, which the first frame has", *self.COMMAND)
+        self.bad(1, "'b_5.exr': the channel A is missing, which is in frame 1", *self.COMMAND)
 
 
 if __name__ == "__main__":

@@ -220,8 +220,11 @@ class Summary(CliTest):
                  *self.made("d.exr", "--spp", "8", "--oidn", "off"), "--oidn", "off", "--spp", "4", "--resume")
         again = (*RENDER, "-o", "d.exr", "--oidn", "off", "--resume")
         self.assertIn("d.exr: complete, with a predicted relMSE of 0.", self.good(*again, "--spp", "8").stderr)
-        self.assertIn("note: the samples of 'd.exr' were not kept (--passes); all are rendered\n",
-                      self.good(*again, "--spp", "12").stderr)
+        before = (self.path / "d.exr").read_bytes()
+        for more in (("--spp", "12"), ("--until", "relmse=1e-9", "--spp", "12")):
+            self.bad(1, "--resume: the samples of 'd.exr' were not kept (--passes); --overwrite instead of --resume "
+                     "renders all", *again, *more)
+        self.assertEqual((self.path / "d.exr").read_bytes(), before)
         self.bad(1, "--resume: 'c.exr' was rendered with other settings (estimator default, now none)", *RENDER,
                  *self.made("c.exr", "--spp", "4"), "--spp", "4", "--estimator", "none", "--resume")
         frames = (*RENDER, "--spp", "4", "--estimator", "none", "--frames", "1-2", "-o", "f_#.exr")

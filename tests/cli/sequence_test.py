@@ -253,6 +253,13 @@ class Told(SequenceTest):
             said = self.good_render("-o", "m_#.exr", "--overwrite", frames="1").stderr
             self.assertEqual("warning: path.json: its cameras mirror the picture; x points to the left" in said, told)
 
+    def test_a_path_beside_the_frames_is_told(self):
+        """The rate of a video, say, where the path's times count frames."""
+        self.write_path((1, START), (3, END))
+        told = "warning: path.json: the camera stands still: the frames are at times 0.125 to 0.375"
+        self.assertIn(told, self.render("-o", "f_#.exr", "--fps", "8", frames="1-3").stderr)
+        self.assertNotIn("stands still", self.render("-o", "g_#.exr", frames="1-3").stderr)
+
     def test_one_frame_has_no_history(self):
         words = ("render", "room.xml", "--camera-path", "path.json", "--no-preview", "--resolution", "32x24", "--spp",
                  "4", "--oidn", "off", "--history", "on", "-o", "h_#.exr", "--frames")
