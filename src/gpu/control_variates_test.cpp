@@ -56,20 +56,18 @@ TEST(ControlVariatesOnDevice, AgreeWithTheProcessor) {
   const test::Grouped crn = crn_image(), independent = independent_image();
   expect_agreement(compare(crn, independent, defaults()), "defaults");
   expect_agreement(compare(crn, independent, paper()), "paper");
-  for (const Penalty penalty : {Penalty::kSample, Penalty::kAsymmetric}) {
+  // Each set of options is a kernel to compile, which takes most of the time.
+  for (const auto& [k, window, shared, penalty] : {std::tuple{50, 21, true, Penalty::kSample},
+                                                   {8, 7, false, Penalty::kAsymmetric},
+                                                   {1, 3, true, defaults().penalty}}) {
     IicvOptions options = defaults();
-    options.penalty = penalty;
-    expect_agreement(compare(crn, independent, options), "penalty");
-  }
-  for (const auto& [k, window, shared] : {std::tuple{50, 21, true}, {25, 11, false}, {8, 7, false}, {1, 3, true}}) {
-    IicvOptions options = defaults();
-    options.k = k, options.window = window, options.shared_coefficients = shared;
+    options.k = k, options.window = window, options.shared_coefficients = shared, options.penalty = penalty;
     expect_agreement(compare(crn, independent, options), "k = " + std::to_string(k));
   }
 }
 
 TEST(ControlVariatesOnDevice, AgreeForOtherNumbersOfGroups) {
-  for (const auto& [crn_groups, independent_groups] : {std::pair{3, 2}, {24, 7}, {8, 16}})
+  for (const auto& [crn_groups, independent_groups] : {std::pair{3, 2}, {24, 7}})
     expect_agreement(compare(crn_image(crn_groups), independent_image(independent_groups), defaults()),
                      std::to_string(crn_groups) + " groups");
 }
