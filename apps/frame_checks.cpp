@@ -97,12 +97,12 @@ std::vector<std::string> read_patterns(const FramePatterns& patterns) {
 
 std::vector<int> take_unfinished(std::vector<int>& frames, const FramePatterns& patterns) {
   const std::vector<std::string> all = read_patterns(patterns);
-  std::vector<int> finished, left;
-  for (const int frame : frames)
-    (std::ranges::all_of(all, [&](const std::string& p) { return is_finished(frame_name(p, frame)); }) ? finished
-                                                                                                       : left)
-        .push_back(frame);
-  frames = std::move(finished);
+  const auto unfinished = std::ranges::stable_partition(frames, [&](int frame) {
+    return std::ranges::all_of(all,
+                               [&](const std::string& pattern) { return is_finished(frame_name(pattern, frame)); });
+  });
+  std::vector<int> left(unfinished.begin(), unfinished.end());
+  frames.erase(unfinished.begin(), unfinished.end());
   return left;
 }
 

@@ -374,10 +374,7 @@ CombinedImage combine_to_the_end(const CombineRequest& asked) {
 
 CombinedImage combine(const CombineRequest& request) {
   CombinedImage combined;
-  if (!run_stoppable(request.stop, [&] { combined = combine_to_the_end(request); })) {
-    combined = {};
-    combined.interrupted = true;
-  }
+  combined.interrupted = !run_stoppable(request.stop, [&] { combined = combine_to_the_end(request); });
   return combined;
 }
 

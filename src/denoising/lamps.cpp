@@ -62,6 +62,7 @@ Image lamps_in(const Image& grey) {
 void darken_lamps(const Image& picture, Image& albedo) {
   if (picture.width != albedo.width || picture.height != albedo.height || picture.channels != 3) return;
   const Image grey = brightness_of(picture), lamps = lamps_in(grey);
+  if (std::ranges::none_of(lamps.data, [](float lamp) { return lamp > 0; })) return;
   parallel_for(grey.height, [&](int y) {
     for (int x = 0; x < grey.width; ++x) {
       float lamp = 0, beside = 0;

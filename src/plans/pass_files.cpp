@@ -159,11 +159,12 @@ std::string film_in(const fs::path& folder) {
   return "";
 }
 
-}  // namespace
-
+/// Whether the request has more samples than the complete picture, or a goal, so that it may replace it.
 bool asks_for_more(const RenderRequest& request, const MadeFile& picture) {
   return request.until > 0 || (request.spp && *request.spp > picture.samples);
 }
+
+}  // namespace
 
 void check_earlier_films(const Plan& plan, const RenderRequest& request) {
   if (request.output.empty() || request.overwrite) return;

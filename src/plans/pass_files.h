@@ -30,9 +30,6 @@ inline bool is_output(const Pass& pass, const RenderRequest& request) { return p
 /// The folder of the films while the plan runs; empty if the request names no file.
 std::filesystem::path passes_folder(const RenderRequest& request);
 
-/// Whether the request has more samples than the complete picture, or a goal, so that it may replace it.
-bool asks_for_more(const RenderRequest& request, const MadeFile& picture);
-
 /// The file of a pass's film; empty if the request names no file.
 std::string pass_path(const Plan& plan, const RenderRequest& request, const PassPlan& pass);
 

@@ -83,7 +83,7 @@ RenderResult PlanRun::run() {
 }
 
 void PlanRun::tell_resumed(std::span<const Pass> passes) {
-  if (std::exchange(has_told_resumed_, true)) return;
+  if (result_.resumed_samples > 0) return;  // it is told
   for (const Pass& pass : passes) result_.resumed_samples += pass.film.mean_count();
   if (result_.resumed_samples > 0 && callbacks_.resumed) callbacks_.resumed(result_.resumed_samples);
 }

@@ -144,8 +144,7 @@ class PlanRun {
   std::shared_ptr<Integrator> of_layers_;  // with RenderRequest::splits_layers(), like the two below
   std::vector<std::string> layer_names_;
   std::vector<Film> layers_;  // with these names; empty until traced
-  bool has_told_resumed_ = false;
-  uint64_t done_ = 0;  // samples of this call, of earlier phases and rounds
+  uint64_t done_ = 0;         // samples of this call, of earlier phases and rounds
   Stopwatch watch_, since_checkpoint_;
   bool consistent_ = true;                        // the films are in the state between two waves
   bool unsaved_ = false;                          // they have samples that have not been written
