@@ -330,8 +330,8 @@ def experiment(suite: str | PathLike[str] | dict[str, Any], output: str | PathLi
              for name, method in (some or {}).items() for word in (option, _program_of(name, method))]
     if scenes is not None:
         words += ["--scenes", fspath(scenes)]
-    with tempfile.TemporaryDirectory(prefix="covary-suite-") as folder, _served(given):
-        made_file = Path(output if isinstance(suite, dict) else folder) / "suite-of-python.json"
+    made_file = Path(output) / "suite-of-python.json"
+    with _served(given):
         if isinstance(suite, dict):
             make_last_folder(made_file)
             made_file.write_text(json.dumps(suite, indent=2) + "\n", encoding="utf-8")
