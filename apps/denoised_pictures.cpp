@@ -157,7 +157,9 @@ Denoised denoise_by_network(const DenoiseCommand& o, const DenoiseTask& task, Pr
   result.attributes = new_attributes(o);
   result.attributes["covary:denoiser"] = "Open Image Denoise " + denoiser_info(o.denoiser()).version;
   const auto seeds = info.attributes.find(std::string("covary:") + film_key::kSeed);
-  const bool merged = seeds != info.attributes.end() && seeds->second.find(',') != std::string::npos;
+  const bool is_for_one_group = o.mode.empty() && !o.clean_features;  // and not because the network is asked for
+  const bool merged =
+      is_for_one_group && seeds != info.attributes.end() && seeds->second.find(',') != std::string::npos;
   result.report = [=, width = image.width, height = image.height, seconds = watch.seconds()] {
     fmt::print(stderr, "{}{}: {} x {}, {}, in {:.2f} s\n{}", o.output, task.text(), width, height, guided, seconds,
                o.inputs.size() > 1 ? ""
