@@ -276,6 +276,13 @@ GroupedSource without(const GroupedSource& source, const std::vector<StrayValue>
   return result;
 }
 
+/// Whether a method of one pass gets the sum of samples and light film, and so denoises light paths, too, as renders do
+/// (denoises_light() of plans/light_plan.h); otherwise the light film is added to its image.
+bool adds_light_first(const CombineRequest& request) {
+  return request.light && !request.crn && request.estimator.one_pass() &&
+         request.light->groups == request.independent.groups;
+}
+
 }  // namespace
 
 InputFindings examine(const CombineRequest& request) {
@@ -355,6 +362,10 @@ CombinedImage combine_to_the_end(const CombineRequest& asked) {
   if (request.crn) request.crn = without(*request.crn, combined.inputs.strays_of_crn);
   request.independent = without(request.independent, combined.inputs.strays);
   combined.check_seconds = watch.lap();
+  if (adds_light_first(request)) {
+    request.independent = with_light(request.independent, *request.light);
+    request.light.reset();
+  }
 
   combined.image = finish(request.layers.empty() ? estimate(request) : estimate_layers(request, combined.layers));
   const double before = combined.image.risks && request.light ? predicted_relmse(combined.image) : 0;

@@ -95,6 +95,8 @@ Method with_denoising(const Method& base, const DenoisingChoice& choice, const M
   if (options.use_oidn) options.oidn.library = choice.oidn;
   options.history = choice.history;
   if (target) {
+    const device::DeviceInfo& info = target->info();
+    if (info.api == device::Api::kCuda) options.oidn.cuda_device = info.number;
     options.mix_pair = [target](const PairMixture& request, const std::function<MixedDenoising()>& here) {
       return target->run([&](device::Device& device) { return gpu::mix_pair(device, request); }, here);
     };

@@ -54,6 +54,19 @@ class Light(BesideTest):
         self.assert_same_bits(arrays.std_error, result.std_error)
         self.assertEqual(covary.iduw(*images, light=self.films["light"]).std_error, None)
 
+    def test_is_denoised_with_the_samples(self):
+        """As in a render, whose bits come again."""
+        self.run_program("render", ROOM, "-o", "denoised.exr", *SIZE, "--integrator", "bdpt", "--set",
+                         "light-tracing=on", "--spp", 8, "--max-depth", 3, "--oidn", "off", "--aovs", "--passes", "p",
+                         "--quiet", "--no-preview")
+        features = {name: covary.read_image(self.path / "denoised.exr", layer) for name, layer in (
+            ("albedo", "Albedo"), ("normal", "N"), ("position", "P"), ("denoising_albedo", "DenoisingAlbedo"),
+            ("denoising_normal", "DenoisingNormal"))}
+        films = {name: covary.Film.load(self.path / "p" / f"{name}.exr") for name in ("independent", "light")}
+        again = covary.combine(None, films["independent"], light=films["light"], clean_features=True, oidn="off",
+                               **features)
+        self.assert_same_bits(again.image, covary.read_image(self.path / "denoised.exr"))
+
     def test_messages(self):
         images = self.films["crn"], self.films["independent"]
         self.assertIn("crn lacks the light of a light film; light adds it", covary.combine(*images).warnings)
