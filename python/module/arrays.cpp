@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "core/large_vector.h"
 #include "core/parallel.h"
+#include "device/device.h"
 
 namespace covary::python {
 namespace {
@@ -52,6 +53,20 @@ void check_shape(const Floats& floats, const std::string& name, const std::strin
   throw nb::value_error(fmt::format("{}: found the shape {}{}; expected [{}]", name, text_of(floats.shape),
                                     has_none ? ", without values" : "", shape)
                             .c_str());
+}
+
+/// The values from the first to the last in memory, of an array on a device.
+void copy_from_device(Floats& floats) {
+  int64_t first = 0, last = 0;  // places relative to `data`
+  for (size_t i = 0; i < floats.shape.size(); ++i)
+    (floats.strides[i] < 0 ? first : last) += (floats.shape[i] - 1) * floats.strides[i];
+  const int number = floats.owner.device_id();
+  const auto address = reinterpret_cast<uintptr_t>(floats.data);
+  floats.copy.resize(static_cast<size_t>(last - first + 1));
+  device::read_from_cuda(number, address + static_cast<uintptr_t>(first) * sizeof(float), floats.copy.data(),
+                         floats.copy.size() * sizeof(float));
+  floats.data = floats.copy.data() - first;
+  floats.there = {floats.data, address, fmt::format("cuda:{}", number)};
 }
 
 /// A NumPy array of the vector's memory, which is freed with the array.
@@ -99,8 +114,11 @@ std::string describe(nb::handle object) {
 Floats floats_of(nb::handle array, const std::string& name, const std::string& shape) {
   Floats floats;
   if (!nb::try_cast(array, floats.owner)) raise_type(array, name, shape, "");
-  if (floats.owner.device_type() != nb::device::cpu::value)
-    raise_type(array, name, shape, describe(array) + " on another device than the CPU (tensor.cpu() copies it)");
+  const int device = floats.owner.device_type();
+  const bool is_here = device == nb::device::cpu::value || device == nb::device::cuda_host::value;
+  if (!is_here && device != nb::device::cuda::value && device != nb::device::cuda_managed::value)
+    raise_type(array, name, shape,
+               describe(array) + " on a device that is neither the processor nor CUDA's (tensor.cpu() copies it)");
   if (floats.owner.dtype() != nb::dtype<float>()) raise_type(array, name, shape, "");
   floats.data = static_cast<const float*>(floats.owner.data());
   for (size_t i = 0; i < floats.owner.ndim(); ++i) {
@@ -108,6 +126,12 @@ Floats floats_of(nb::handle array, const std::string& name, const std::string& s
     floats.strides.push_back(floats.owner.stride(i));
   }
   check_shape(floats, name, shape);
+  if (is_here) return floats;
+  try {
+    copy_from_device(floats);
+  } catch (const device::Failure& failure) {
+    throw Error(failure.code(), fmt::format("{}: {}; tensor.cpu() copies it", name, failure.what()));
+  }
   return floats;
 }
 
@@ -123,7 +147,10 @@ GroupedImage Groups::view() {
   const std::vector<int64_t>& s = source_.strides;
   // With a size of 1, any stride will do.
   const auto lies = [&](int axis, int64_t stride) { return source_.shape[axis] == 1 || s[axis] == stride; };
-  if (lies(0, 3) && lies(1, W * T * 3) && lies(2, T * 3) && lies(3, 1)) return image;
+  if (lies(0, 3) && lies(1, W * T * 3) && lies(2, T * 3) && lies(3, 1)) {
+    if (source_.there.handle) image.on_device = &source_.there;
+    return image;
+  }
   constexpr int64_t kBlock = 128;  // pixels whose groups stay in the fastest memory while they are brought together
   if (!ordered_) {
     ordered_.reset(large_pages(static_cast<size_t>(T * H * W * 3)));

@@ -26,20 +26,23 @@ namespace nb = nanobind;
 /// "numpy.ndarray of float64": describes an object that is not accepted.
 std::string describe(nb::handle object);
 
-/// The float32 values of a Python array in place, with any strides.
+/// The float32 values of a Python array in place, with any strides; of one on a device of CUDA, a copy.
 struct Floats {
   nb::ndarray<nb::ro> owner;
   const float* data = nullptr;
   std::vector<int64_t> shape, strides;  ///< strides in floats
+  std::vector<float> copy;              ///< what `data` points to if the values are on a device
+  ValuesOnDevice there = {};            ///< of those
 };
 
 /// The array's values. `name` stands for the argument in messages; `shape` is the expected shape, such as "H, W, 3",
-/// whose numbers are sizes that the array must have. Raises TypeError for another type of object, values or device, and
-/// ValueError for another shape.
+/// whose numbers are sizes that the array must have. Raises TypeError for another type of object or values, or a device
+/// that is neither the processor nor one of CUDA, and ValueError for another shape; throws device::Failure.
 Floats floats_of(nb::handle array, const std::string& name, const std::string& shape);
 
 /// An array [T, H, W, 3] as a grouped image. Memory in the order [H, W, T, 3] is used in place. view() copies other
-/// orders into this one when it is first called, which needs no GIL.
+/// orders into this one when it is first called, which needs no GIL. In that order, values on a device of CUDA are read
+/// in place there, too.
 class Groups {
  public:
   /// Raises like floats_of().

@@ -251,7 +251,7 @@ Method estimator_of(bool is_pair, const std::string& name, const OptionValues& o
   if (!denoising.denoises())
     throw Error(ErrorCode::kUsage,
                 "denoise: found 'none'; without crn, images are only denoised: 'auto', 'bias', 'balanced' or 'error'");
-  return with_denoising(make_estimator(kNoEstimator, options), denoising);
+  return with_denoising(make_estimator(kNoEstimator, options), denoising, target);
 }
 
 nb::dict combine(nb::object crn, nb::object independent, const ExtraInputs& beside, const CombineArguments& arguments,

@@ -121,6 +121,9 @@ void bind_images(nb::module_& module) {
   using namespace nb::literals;
   module.def("is_made_by", &is_made_by, "path"_a, "command"_a,
              nb::sig("def is_made_by(path: str, command: str) -> bool"));
+  module.def(
+      "copied", [](nb::object image) { return array_of(image_of(image, "image")); }, "image"_a.none(),
+      nb::sig("def copied(image: object) -> typing.Any"));
   module.def("read_image", &read, "path"_a, "layer"_a, "accept_changed"_a = false,
              nb::sig("def read_image(path: str, layer: str, accept_changed: bool = False) -> typing.Any"));
   module.def("write_image", &write, "path"_a, "image"_a.none(), "attributes"_a,

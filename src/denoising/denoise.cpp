@@ -46,6 +46,20 @@ struct Api {
   void (*commit_filter)(void* filter) = nullptr;
   void (*execute_filter)(void* filter) = nullptr;
   void (*release_filter)(void* filter) = nullptr;
+  // Only of a library with devices of CUDA, whose images are in buffers:
+  bool (*is_cuda_supported)(int number) = nullptr;
+  void* (*new_cuda_device)(const int* numbers, void* const* streams, int count) = nullptr;
+  void* (*new_buffer)(void* device, size_t bytes) = nullptr;
+  void (*write_buffer)(void* buffer, size_t offset, size_t bytes, const void* from) = nullptr;
+  void (*read_buffer)(void* buffer, size_t offset, size_t bytes, void* to) = nullptr;
+  void (*release_buffer)(void* buffer) = nullptr;
+  void (*set_image_in_buffer)(void* filter, const char* name, void* buffer, int format, size_t width, size_t height,
+                              size_t byte_offset, size_t pixel_stride, size_t row_stride) = nullptr;
+
+  bool has_cuda(int number) const {
+    return number >= 0 && is_cuda_supported && new_cuda_device && new_buffer && write_buffer && read_buffer &&
+           release_buffer && set_image_in_buffer && is_cuda_supported(number);
+  }
 };
 
 /// Where the Python wheel `pyoidn` puts the library, from the root of an environment downwards; a star matches any
@@ -128,8 +142,13 @@ LibraryFile open_library(const DenoiseOptions& options, std::string& why) {
 }
 
 template <typename Function>
-void bind(const LibraryFile& library, const char* name, Function& function) {
+void bind_if_any(const LibraryFile& library, const char* name, Function& function) {
   function = reinterpret_cast<Function>(dlsym(library.handle, name));
+}
+
+template <typename Function>
+void bind(const LibraryFile& library, const char* name, Function& function) {
+  bind_if_any(library, name, function);
   if (!function)
     throw Error(ErrorCode::kIo,
                 fmt::format("{} has no function {}; version 2 of Open Image Denoise is needed", library.path, name));
@@ -161,6 +180,13 @@ Api load(const DenoiseOptions& options, std::string* path = nullptr) {
   bind(library, "oidnCommitFilter", api.commit_filter);
   bind(library, "oidnExecuteFilter", api.execute_filter);
   bind(library, "oidnReleaseFilter", api.release_filter);
+  bind_if_any(library, "oidnIsCUDADeviceSupported", api.is_cuda_supported);
+  bind_if_any(library, "oidnNewCUDADevice", api.new_cuda_device);
+  bind_if_any(library, "oidnNewBuffer", api.new_buffer);
+  bind_if_any(library, "oidnWriteBuffer", api.write_buffer);
+  bind_if_any(library, "oidnReadBuffer", api.read_buffer);
+  bind_if_any(library, "oidnReleaseBuffer", api.release_buffer);
+  bind_if_any(library, "oidnSetFilterImage", api.set_image_in_buffer);
   return api;
 }
 
@@ -202,26 +228,39 @@ std::string find_denoiser(const DenoiseOptions& options) {
   return open_library(options, why).path;
 }
 
+bool runs_on_cuda(const DenoiseOptions& options) { return load(options).has_cuda(options.cuda_device); }
+
 struct Denoiser::Library {
   std::string path;
   Api api;
+  bool is_on_cuda;
   std::unique_ptr<void, void (*)(void*)> device;
 
   explicit Library(const DenoiseOptions& options)
-      : api(load(options, &path)), device(api.new_device(Api::kDeviceCpu), api.release_device) {
+      : api(load(options, &path)),
+        is_on_cuda(api.has_cuda(options.cuda_device)),
+        device(is_on_cuda ? cuda_device(options.cuda_device) : api.new_device(Api::kDeviceCpu), api.release_device) {
     check();
+    if (!is_on_cuda) use_processor();
+    api.commit_device(device.get());
+    check();
+  }
+
+  void* cuda_device(int number) const {
+    void* const usual_stream = nullptr;
+    return api.new_cuda_device(&number, &usual_stream, 1);
+  }
+  void use_processor() const {
     const auto threads = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
     api.set_device_int(device.get(), "numThreads", static_cast<int>(threads));
     // Pinned threads of two processes on one machine would compete for the same cores.
     api.set_device_int(device.get(), "setAffinity", 0);
-    api.commit_device(device.get());
-    check();
   }
 
   void check() const {
     const char* message = nullptr;
     if (api.device_error(device.get(), &message) != 0 || !device)
-      throw Error(ErrorCode::kIo, fmt::format("Open Image Denoise: {}", message ? message : "no processor device"));
+      throw Error(ErrorCode::kIo, fmt::format("Open Image Denoise: {}", message ? message : "no device"));
   }
 };
 
@@ -240,14 +279,25 @@ struct Run {
   void execute() {
     const Api& api = library->api;
     // The library stores errors per thread.
-    const std::unique_ptr<void, void (*)(void*)> filter(api.new_filter(library->device.get(), "RT"),
-                                                        api.release_filter);
+    void* const device = library->device.get();
+    const std::unique_ptr<void, void (*)(void*)> filter(api.new_filter(device, "RT"), api.release_filter);
     library->check();
+    std::vector<std::unique_ptr<void, void (*)(void*)>> buffers;
+    const auto bytes = [](const Image& image) { return image.data.size() * sizeof(float); };
     const auto set = [&](const char* name, const Image& image) {
-      void* const pixels = const_cast<float*>(image.data.data());  // the library does not write to its inputs
-      api.set_image(filter.get(), name, pixels, Api::kFormatFloat3, image.width, image.height, 0, 0, 0);
+      if (library->is_on_cuda) {
+        void* const buffer = buffers.emplace_back(api.new_buffer(device, bytes(image)), api.release_buffer).get();
+        library->check();
+        api.set_image_in_buffer(filter.get(), name, buffer, Api::kFormatFloat3, image.width, image.height, 0, 0, 0);
+      } else {
+        void* const pixels = const_cast<float*>(image.data.data());  // the library does not write to its inputs
+        api.set_image(filter.get(), name, pixels, Api::kFormatFloat3, image.width, image.height, 0, 0, 0);
+      }
     };
-    for (const auto& [name, image] : inputs) set(name, *image);
+    for (const auto& [name, image] : inputs) {
+      set(name, *image);
+      if (library->is_on_cuda) api.write_buffer(buffers.back().get(), 0, bytes(*image), image->data.data());
+    }
     result = Image(inputs.front().second->width, inputs.front().second->height, 3);
     set("output", result);
     if (hdr) api.set_bool(filter.get(), "hdr", true);
@@ -258,6 +308,9 @@ struct Run {
     api.commit_filter(filter.get());
     library->check();
     api.execute_filter(filter.get());
+    library->check();
+    if (!library->is_on_cuda) return;
+    api.read_buffer(buffers.back().get(), 0, bytes(result), result.data.data());
     library->check();
   }
 };

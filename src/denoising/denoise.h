@@ -18,10 +18,13 @@ struct DenoiseOptions {
   /// if pip installed both, the loader's path, and the wheel's usual places ($VIRTUAL_ENV, $CONDA_PREFIX, the user's
   /// and the system's packages).
   std::string library;
+  /// The device of CUDA on which it runs, where the library has what that needs; -1: the processor.
+  int cuda_device = -1;
 };
 
 /// The library and its device, loaded once for any number of images. On one machine, the same input gives the same
-/// bits, and did so for every number of threads tried (docs/methods/denoising.md).
+/// bits, and did so for every number of threads tried (docs/methods/denoising.md). On a device of CUDA, images are
+/// copied there and back, and the library's arithmetic is another (half precision).
 class Denoiser {
  public:
   struct Library;
@@ -31,7 +34,7 @@ class Denoiser {
   Denoiser(const Denoiser&) = delete;
   Denoiser& operator=(const Denoiser&) = delete;
 
-  /// Denoises `rgb` (linear, 3 channels, high dynamic range) on the CPU. `albedo` in [0, 1] and `normal` in [-1, 1] are
+  /// Denoises `rgb` (linear, 3 channels, high dynamic range) . `albedo` in [0, 1] and `normal` in [-1, 1] are
   /// features that preserve texture and edges: 3 channels, the same size, or null; the normal only together with the
   /// albedo. They may be noisy unless `clean_features` is set. Values of `rgb` that cannot be used are replaced first
   /// (filters/stray_values.h), those of features that are not finite set to zero. Throws
@@ -65,6 +68,10 @@ struct DenoiserInfo {
 };
 /// Loads the denoiser. Throws like Denoiser().
 DenoiserInfo denoiser_info(const DenoiseOptions& options = {});
+
+/// Whether the library, which must be there, can run on options.cuda_device: its part for CUDA is installed, and takes
+/// the device.
+bool runs_on_cuda(const DenoiseOptions& options);
 
 /// Path of the library that denoise() would load; "" if there is none.
 std::string find_denoiser(const DenoiseOptions& options = {});

@@ -171,11 +171,17 @@ MixedDenoising denoise_frame(DenoisingParts parts, const std::vector<CandidateMa
   return out;
 }
 
+void add_note(const std::string& text, MethodImage& result) { result.note += (result.note.empty() ? "" : "; ") + text; }
+
 /// Tells what is not made elsewhere although options.mix_mean is given.
 void tell_that_made_here(const MixedDenoisingOptions& options, const char* what, MethodImage& result) {
-  if (!options.mix_mean) return;
-  result.note +=
-      fmt::format("{}{} are denoised on the processor, not on the device", result.note.empty() ? "" : "; ", what);
+  if (options.mix_mean) add_note(fmt::format("{} are denoised on the processor, not on the device", what), result);
+}
+
+/// Tells that the network did not run on the device that it should run on.
+void tell_where_network_ran(const DenoiseOptions& oidn, MethodImage& result) {
+  if (oidn.cuda_device >= 0 && !runs_on_cuda(oidn))
+    add_note("Open Image Denoise ran on the processor: what is installed of it cannot use this device", result);
 }
 
 Run run_of_pair(const Method& base, const MixedDenoisingOptions& options, bool with_oidn) {
@@ -207,6 +213,7 @@ Run run_of_pair(const Method& base, const MixedDenoisingOptions& options, bool w
                                mean_image(parts.halves[1].independent)});
       };
     MixedDenoising out = options.mix_pair(request, here);
+    if (with_oidn) tell_where_network_ran(options.oidn, out.result);
     keep_features(options, settings.features, out.result);
     return out;
   };
@@ -239,6 +246,7 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
     }
     request.history = history_of_frame(options, settings.features);
     MixedDenoising out = options.mix_mean(request, here);
+    if (with_oidn) tell_where_network_ran(options.oidn, out.result);
     keep_features(options, settings.features, out.result);
     return out;
   };

@@ -3,15 +3,25 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <functional>
 #include <map>
+#include <memory>
 
 #include "device/backend.h"
 #include "device/cuda_api.h"
+#include "device/device.h"
 
 namespace covary::device {
 namespace {
 
 using namespace cuda;
+
+[[noreturn]] void fail(const Driver& cu, const std::string& device, int code, const std::string& what) {
+  const char* name = nullptr;
+  cu.error_name(code, &name);
+  throw Failure(code == kOutOfMemory ? FailureKind::kMemory : FailureKind::kLost,
+                fmt::format("{} failed: {}: {}", device, what, name ? name : std::to_string(code)));
+}
 
 int attribute(const Driver& cu, int what, DeviceNumber device) {
   int value = 0;
@@ -162,11 +172,7 @@ class CudaBackend final : public Backend {
   void enter() { check(cu_.set_context(context_), "cuCtxSetCurrent"); }
 
   void check(int code, const std::string& what) const {
-    if (code == kSuccess) return;
-    const char* name = nullptr;
-    cu_.error_name(code, &name);
-    throw Failure(code == kOutOfMemory ? FailureKind::kMemory : FailureKind::kLost,
-                  fmt::format("{} failed: {}: {}", info_.text(), what, name ? name : std::to_string(code)));
+    if (code != kSuccess) fail(cu_, info_.text(), code, what);
   }
 
   const Driver& cu_;
@@ -189,6 +195,24 @@ std::vector<DeviceInfo> cuda_devices(std::string* why) {
   for (int i = 0; i < n; ++i) infos.push_back(info_of(*cu, i));
   if (infos.empty() && why) *why = "its driver finds no device";
   return infos;
+}
+
+void read_from_cuda(int number, uint64_t from, void* to, size_t bytes) {
+  std::string why;
+  const Driver* cu = driver(&why);
+  if (!cu) throw Failure(FailureKind::kUnavailable, "cuda: " + why);
+  const auto check = [&](int code, const char* what) {
+    if (code != kSuccess) fail(*cu, fmt::format("cuda:{}", number), code, what);
+  };
+  DeviceNumber device = 0;
+  Context context = nullptr;
+  check(cu->device_get(&device, number), "cuDeviceGet");
+  check(cu->retain_context(&context, device), "cuDevicePrimaryCtxRetain");
+  const std::unique_ptr<const Driver, std::function<void(const Driver*)>> release(
+      cu, [device](const Driver* owner) { owner->release_context(device); });
+  check(cu->set_context(context), "cuCtxSetCurrent");
+  check(cu->read(to, from, bytes, nullptr), "cuMemcpyDtoHAsync");
+  check(cu->synchronise(nullptr), "cuStreamSynchronize");
 }
 
 std::unique_ptr<Backend> open_cuda(int number) { return std::make_unique<CudaBackend>(number); }

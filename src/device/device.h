@@ -175,4 +175,8 @@ class Device {
   std::unique_ptr<Programs> programs_;
 };
 
+/// Copies memory that another program has on a device of CUDA, of the primary context, here; needs no compiler of
+/// kernels. What its owner does with it in the usual stream is waited for. Throws Failure.
+void read_from_cuda(int number, uint64_t from, void* to, size_t bytes);
+
 }  // namespace covary::device

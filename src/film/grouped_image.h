@@ -11,6 +11,13 @@
 
 namespace covary {
 
+/// An image's values in the memory of a device.
+struct ValuesOnDevice {
+  const float* of = nullptr;  ///< `data` of the image; images with other values have none there
+  uint64_t handle = 0;        ///< as Device::borrow() takes it (device/device.h)
+  std::string device;         ///< DeviceInfo::id(), "cuda:0"
+};
+
 /// T group means for every pixel of a linear RGB image: data[((y * width + x) * groups + t) * 3 + channel], each of
 /// independent samples. Does not own the memory.
 ///
@@ -27,6 +34,8 @@ struct GroupedImage {
   /// Mean squared deviation of a pixel's samples from the means of their groups, RGB, if the film keeps it; or null.
   /// Only read together with `counts`.
   const float* variance_in_groups = nullptr;
+  /// Where that device need not be sent them; or null. Rows beside the first ones are sent.
+  const ValuesOnDevice* on_device = nullptr;
   const float* pixel(int x, int y) const { return data + (static_cast<size_t>(y) * width + x) * groups * 3; }
   /// Samples of a pixel; without counts, one per group.
   uint32_t count(int x, int y) const {

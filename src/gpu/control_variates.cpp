@@ -10,6 +10,7 @@
 #include "estimators/pair_steps.h"
 #include "filters/relative_counts.h"
 #include "gpu/bands.h"
+#include "gpu/denoising_parts.h"
 #include "gpu/launch.h"
 #include "gpu/residual_correction.h"
 
@@ -90,7 +91,6 @@ class Variates {
     return all;
   }
 
-  std::span<const float> groups_of(const GroupedImage& image) const { return {image.data, n_ * 3 * image.groups}; }
   /// A buffer of one element where there are none.
   Buffer<uint32_t> counts_of(const GroupedImage& image) {
     return image.counts ? device_.upload(std::span(image.counts, n_)) : device_.make<uint32_t>(1);
@@ -101,8 +101,8 @@ class Variates {
     Buffer<uint32_t> crn_counts, independent_counts;
     const std::vector<float> relative_count = relative_counts(independent_);
     stages_.run("copy there", [&] {
-      crn = device_.upload(groups_of(crn_));
-      independent = device_.upload(groups_of(independent_));
+      crn = samples_on(device_, crn_);
+      independent = samples_on(device_, independent_);
       crn_counts = counts_of(crn_), independent_counts = counts_of(independent_);
       relative = relative_count.empty() ? device_.make<float>(1) : device_.upload(std::span(relative_count));
     });

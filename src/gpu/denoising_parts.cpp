@@ -42,15 +42,18 @@ PartBuffers part_of(Device& device, const Groups& groups, const GroupSet& set) {
 
 }  // namespace
 
-Groups upload(Device& device, const GroupedImage& image) {
+Buffer<float> samples_on(Device& device, const GroupedImage& image) {
   const size_t values = static_cast<size_t>(image.width) * image.height * image.groups * 3;
-  return groups_of(device, image, device.upload(std::span(image.data, values)));
+  const ValuesOnDevice* const there = image.on_device;
+  if (there && there->of == image.data && there->device == device.info().id())
+    return device.borrow<float>(there->handle, values);
+  COVARY_CHECK(image.data, "an image without values here has them on the device that it is made on");
+  return device.upload(std::span(image.data, values));
 }
 
-Groups groups_of(Device& device, const GroupedImage& image, Buffer<float> samples) {
-  Groups result{image.width, image.height, image.groups, std::move(samples), {}, image.counts != nullptr, {}};
+Groups upload(Device& device, const GroupedImage& image) {
+  Groups result{image.width, image.height, image.groups, samples_on(device, image), {}, image.counts != nullptr, {}};
   const auto pixels = static_cast<size_t>(result.pixels());
-  COVARY_CHECK(result.data.size() == pixels * image.groups * 3, "as many samples as the image has");
   constexpr uint32_t kNone = 0;
   result.counts = device.upload(image.counts ? std::span(image.counts, pixels) : std::span(&kNone, 1));
   result.valid = device.make<unsigned char>(pixels);

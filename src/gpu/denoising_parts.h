@@ -26,8 +26,8 @@ struct Groups {
   int pixels() const { return width * height; }
 };
 Groups upload(Device& device, const GroupedImage& image);
-/// The same of samples that are on the device already, in the order of GroupedImage::data, which is not read.
-Groups groups_of(Device& device, const GroupedImage& image, Buffer<float> samples);
+/// The samples of an image on the device: in place if they are there (GroupedImage::on_device), otherwise a copy.
+Buffer<float> samples_on(Device& device, const GroupedImage& image);
 
 /// Groups first, first + step, …
 struct GroupSet {

@@ -7,6 +7,7 @@
 
 #include "estimators/pair_steps.h"
 #include "filters/planes.h"
+#include "gpu/denoising_parts.h"
 #include "gpu/launch.h"
 
 namespace covary::gpu {
@@ -83,7 +84,7 @@ class Iduw {
   }
 
   Groups upload(const GroupedImage& image) {
-    return {image, device_.upload(std::span(image.data, n_ * 3 * image.groups)),
+    return {image, samples_on(device_, image),
             image.counts ? device_.upload(std::span(image.counts, n_)) : device_.make<uint32_t>(1)};
   }
 

@@ -13,7 +13,7 @@ LayerBuffers upload_layer(Device& device, const GroupedImage& layer, const Group
                           bool planted_bug) {
   COVARY_CHECK(layer.groups == picture.groups, "layers have the groups of the picture");
   const auto pixels = static_cast<size_t>(picture.pixels());
-  const Buffer<float> data = device.upload(std::span(layer.data, pixels * layer.groups * 3));
+  const Buffer<float> data = samples_on(device, layer);
   LayerBuffers result{device.make<float>(3 * pixels), device.make<float>(3 * pixels)};
   const Buffer<float>& not_read = data;
   device.launch(device.kernel("layers.cl", "layer_means", with_bug({}, planted_bug)), list_of(pixels), kOfList, data,

@@ -27,14 +27,13 @@ struct BandOnDevice {
   MeanMixture request;
   std::optional<RowsOnDevice> rows;
 
-  BandOnDevice(Device& device, const MeanMixture& whole, const RowBand& wanted, const Trial& trial,
-               const Buffer<float>* samples)
+  BandOnDevice(Device& device, const MeanMixture& whole, const RowBand& wanted, const Trial& trial)
       : band(wanted), request(whole) {
     if (band.rows < whole.independent.height) {
       request.independent = rows_of(whole.independent, band.first, band.rows);
       request.features = features.emplace(whole.features, band.first, band.rows).features;
     }
-    rows.emplace(device, request, trial, samples);
+    rows.emplace(device, request, trial);
   }
 };
 
@@ -89,8 +88,8 @@ class SamplesMixture {
 
 class MeanDenoising {
  public:
-  MeanDenoising(Device& device, const MeanMixture& request, const Trial& trial, const Buffer<float>* samples)
-      : device_(device), request_(request), trial_(trial), samples_(samples), height_(request.independent.height) {}
+  MeanDenoising(Device& device, const MeanMixture& request, const Trial& trial)
+      : device_(device), request_(request), trial_(trial), height_(request.independent.height) {}
 
   /// In bands of so many rows. After a failure, a network's images are kept.
   MixedDenoising run(int rows_at_once) {
@@ -136,7 +135,7 @@ class MeanDenoising {
   RowsOnDevice& on_device(const RowBand& band) {
     if (!last_ || last_->band.first != band.first || last_->band.rows != band.rows) {
       last_.reset();  // gives back its memory
-      last_.emplace(device_, request_, band, trial_, samples_);
+      last_.emplace(device_, request_, band, trial_);
     }
     return *last_->rows;
   }
@@ -231,7 +230,6 @@ class MeanDenoising {
   Device& device_;
   const MeanMixture& request_;
   const Trial& trial_;
-  const Buffer<float>* const samples_;
   const int height_;
   int rows_at_once_ = 0;
   std::optional<BandOnDevice> last_;
@@ -239,15 +237,16 @@ class MeanDenoising {
   NetworkLayers network_layers_;
 };
 
-/// `samples`: on the device; or null.
-MixedDenoising mixed(Device& device, const MeanMixture& request, const Buffer<float>* samples, const Trial& trial) {
+}  // namespace
+
+MixedDenoising mix_mean(Device& device, const MeanMixture& request, const Trial& trial) {
   const GroupedImage& image = request.independent;
   BandNeeds needs;
   needs.bytes_per_pixel = bytes_of_mean(image.groups) + (request.layers.empty() ? 0 : bytes_of_layer(image.groups));
   if (request.features.differences) needs.bytes_per_pixel += kBytesOfHalfFeatures;
   needs.largest_buffer_per_pixel = largest_buffer_of_mean(image.groups);
   const int halo = mixed_halo(CandidateBase::kMean, static_cast<bool>(request.network), kMeanHalo, request.weighting);
-  const bool has_history = request.history.is_used(), is_whole = has_history || samples;
+  const bool has_history = request.history.is_used(), is_whole = has_history || !image.data;
   if (has_history) needs.bytes_per_pixel += kBytesOfHistory + (request.network ? bytes_of_mean(2) : 0);
   int rows =
       trial.rows_at_once > 0 ? trial.rows_at_once : rows_that_fit(device.info(), image.width, image.height, needs);
@@ -256,7 +255,7 @@ MixedDenoising mixed(Device& device, const MeanMixture& request, const Buffer<fl
         device::FailureKind::kMemory,
         fmt::format("{} are denoised as a whole, and the device's memory holds {} of {} rows",
                     has_history ? "frames with a history" : "samples on a device", rows, image.height));
-  MeanDenoising denoising(device, request, trial, samples);
+  MeanDenoising denoising(device, request, trial);
   while (true) {
     try {
       return denoising.run(rows);
@@ -265,16 +264,6 @@ MixedDenoising mixed(Device& device, const MeanMixture& request, const Buffer<fl
       rows = std::min(rows, image.height) / 2;
     }
   }
-}
-
-}  // namespace
-
-MixedDenoising mix_mean(Device& device, const MeanMixture& request, const Trial& trial) {
-  return mixed(device, request, nullptr, trial);
-}
-
-MixedDenoising mix_mean(Device& device, const MeanMixture& request, const Buffer<float>& samples, const Trial& trial) {
-  return mixed(device, request, &samples, trial);
 }
 
 MixedDenoising mix_pair(Device& device, const PairMixture& request, const Trial& trial) {

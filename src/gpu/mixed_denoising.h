@@ -18,14 +18,10 @@ using device::Device;
 /// Implements MixedDenoisingOptions::mix_mean. Values agree with the processor's to rounding: 99.9 % of them within
 /// 1e-4 of value + 0.01. Bit-identical on one device. An image that does not fit the device's memory is made in bands
 /// that overlap by the radius of influence, smaller ones if the device has less memory than it tells; they agree with
-/// the whole to rounding. Throws device::Failure, and like the network.
+/// the whole to rounding. Samples that are on the device already, such as those of a renderer, are read in place
+/// (GroupedImage::on_device); those that are nowhere else (`data` null) are not made in bands. Throws device::Failure,
+/// and like the network.
 MixedDenoising mix_mean(Device& device, const MeanMixture& request, const Trial& trial = {});
-
-/// The same of samples that are on the device already, such as those of a renderer (Device::borrow()): in the order of
-/// GroupedImage::data. `request` has their size, groups and counts, without data. They are read in place, and nothing
-/// is made in bands.
-MixedDenoising mix_mean(Device& device, const MeanMixture& request, const Buffer<float>& samples,
-                        const Trial& trial = {});
 
 /// Implements MixedDenoisingOptions::mix_pair, of the whole image at once.
 MixedDenoising mix_pair(Device& device, const PairMixture& request, const Trial& trial = {});

@@ -326,16 +326,17 @@ TEST(GpuMixedDenoising, ReadsSamplesOnTheDeviceInPlace) {
   const size_t with_copy = std::exchange(written, 0);
   const Buffer<float> owned = device.upload(std::span(image.data));
   {
-    const Buffer<float> samples = device.borrow<float>(owned.handle(), owned.size());
+    const ValuesOnDevice samples{nullptr, owned.handle(), device.info().id()};
     request.independent.data = nullptr;
+    request.independent.on_device = &samples;
     written = 0;
-    const MixedDenoising found = mix_mean(device, request, samples);
+    const MixedDenoising found = mix_mean(device, request);
     EXPECT_EQ(found.result.estimate.data, expected.result.estimate.data);
     EXPECT_EQ(found.result.std_error.data, expected.result.std_error.data);
+    EXPECT_EQ(with_copy - written, image.data.size() * sizeof(float));
+    EXPECT_EQ(device.download(owned), image.data);
+    EXPECT_THROW(mix_mean(device, request, {"", 20, {}}), device::Failure) << "not in bands";
   }
-  EXPECT_EQ(with_copy - written, image.data.size() * sizeof(float));
-  EXPECT_EQ(device.download(owned), image.data);
-  EXPECT_THROW(mix_mean(device, request, owned, {"", 20, {}}), device::Failure) << "not in bands";
 }
 
 TEST(GpuMixedDenoising, TellsItsStages) {

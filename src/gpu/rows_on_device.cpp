@@ -18,7 +18,7 @@ namespace covary::gpu {
 double bytes_of_mean(int groups) { return 12.0 * groups + 700; }
 double largest_buffer_of_mean(int groups) { return 12.0 * std::max(groups, kMaxCandidates); }
 
-RowsOnDevice::RowsOnDevice(Device& device, const MeanMixture& request, const Trial& trial, const Buffer<float>* samples)
+RowsOnDevice::RowsOnDevice(Device& device, const MeanMixture& request, const Trial& trial)
     : device_(device),
       base_(CandidateBase::kMean),
       independent_(request.independent),
@@ -28,8 +28,7 @@ RowsOnDevice::RowsOnDevice(Device& device, const MeanMixture& request, const Tri
       std_error_(request.std_error || request.history.is_used()),
       stages_(device, trial) {
   stages_.run("copy samples and auxiliary images", [&] {
-    groups_ = samples ? groups_of(device_, independent_, device_.borrow<float>(samples->handle(), samples->size()))
-                      : upload(device_, independent_);
+    groups_ = upload(device_, independent_);
     upload_features();
   });
   stages_.run("means and errors", [&] { parts_ = parts_of_mean(device_, groups_); });

@@ -29,8 +29,7 @@ inline constexpr double kBytesOfHalfFeatures = 200;
 class RowsOnDevice {
  public:
   /// `request`: with the samples and features of these rows, which must outlive the object.
-  /// `samples`: those of the request, if they are on the device already; null: they are copied.
-  RowsOnDevice(Device& device, const MeanMixture& request, const Trial& trial, const Buffer<float>* samples = nullptr);
+  RowsOnDevice(Device& device, const MeanMixture& request, const Trial& trial);
   RowsOnDevice(Device& device, const PairMixture& request, const Trial& trial);
 
   /// What a network denoises: of all samples and of both halves.
