@@ -46,10 +46,10 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = DEFAULT, *, l
     """Combines `crn`, whose pixels share their random numbers, and `independent`, whose pixels do not, into one image.
 
     Each is a float32 array [T, H, W, 3], the means of T groups of samples (renders with different seeds), from NumPy,
-    PyTorch or anything with DLPack or the buffer protocol, with any strides; a list of T arrays; or a Film. Values are
-    linear; 12 groups are recommended. The memory order [H, W, T, 3], as from read_groups() and Film.groups, is read in
-    place; an array of that shape, of more than 64 x 64 pixels, is recognised, with a warning. Without crn (None),
-    `independent` alone is denoised, from two groups on.
+    PyTorch or anything with DLPack or the buffer protocol, with any strides, on a GPU, too; a list of T arrays; or a
+    Film. Values are linear; 12 groups are recommended. The memory order [H, W, T, 3], as from read_groups() and
+    Film.groups, is read in place; an array of that shape, of more than 64 x 64 pixels, is recognised, with a warning.
+    Without crn (None), `independent` alone is denoised, from two groups on.
 
     estimator: the default mixes denoised images into the combined one where held-out samples prefer them; "iicv" does
         not denoise, and the others are there to compare with. Options follow as keywords (typed in covary.estimators);
