@@ -176,10 +176,10 @@ def _stacked(value: Any) -> Any:
 
     if len({tuple(v.shape) for v in value}) > 1:
         raise ValueError(f"found arrays of the shapes {', '.join(str(list(v.shape)) for v in value)}")
-    return numpy.stack([_covary.copied(v) if _is_elsewhere(v) else numpy.asarray(v) for v in value])
+    return numpy.stack([_covary.copied(v) if is_elsewhere(v) else numpy.asarray(v) for v in value])
 
 
-def _is_elsewhere(array: Any) -> bool:
+def is_elsewhere(array: Any) -> bool:
     """Whether it is on another device than the processor, by DLPack."""
     device = getattr(array, "__dlpack_device__", None)
     return device is not None and int(device()[0]) != 1

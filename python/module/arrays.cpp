@@ -165,6 +165,10 @@ GroupedImage Groups::view() {
     });
   }
   image.data = ordered_.get();
+  if (source_.there.handle) {
+    source_.there.of = image.data, source_.there.strides = s;
+    image.on_device = &source_.there;
+  }
   return image;
 }
 

@@ -41,8 +41,7 @@ struct Floats {
 Floats floats_of(nb::handle array, const std::string& name, const std::string& shape);
 
 /// An array [T, H, W, 3] as a grouped image. Memory in the order [H, W, T, 3] is used in place. view() copies other
-/// orders into this one when it is first called, which needs no GIL. In that order, values on a device of CUDA are read
-/// in place there, too.
+/// orders into this one when it is first called, which needs no GIL. Values on a device of CUDA stay there, too.
 class Groups {
  public:
   /// Raises like floats_of().

@@ -16,6 +16,9 @@ struct ValuesOnDevice {
   const float* of = nullptr;  ///< `data` of the image; images with other values have none there
   uint64_t handle = 0;        ///< as Device::borrow() takes it (device/device.h)
   std::string device;         ///< DeviceInfo::id(), "cuda:0"
+  /// How far apart groups, rows, pixels and channels lie, in floats; empty: in the order of GroupedImage::data. The
+  /// handle is then an address of CUDA.
+  std::vector<int64_t> strides;
 };
 
 /// T group means for every pixel of a linear RGB image: data[((y * width + x) * groups + t) * 3 + channel], each of

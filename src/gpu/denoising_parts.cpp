@@ -45,8 +45,16 @@ PartBuffers part_of(Device& device, const Groups& groups, const GroupSet& set) {
 Buffer<float> samples_on(Device& device, const GroupedImage& image) {
   const size_t values = static_cast<size_t>(image.width) * image.height * image.groups * 3;
   const ValuesOnDevice* const there = image.on_device;
-  if (there && there->of == image.data && there->device == device.info().id())
-    return device.borrow<float>(there->handle, values);
+  if (there && there->of == image.data && there->device == device.info().id()) {
+    auto borrowed = device.borrow<float>(there->handle, values);
+    if (there->strides.empty()) return borrowed;
+    const std::vector<int64_t>& apart = there->strides;
+    const int n_pixels = image.width * image.height;
+    auto ordered = device.make<float>(values);
+    device.launch(kernel(device, "in_order"), list_of(static_cast<size_t>(n_pixels)), kOfList, borrowed, apart[0],
+                  apart[1], apart[2], apart[3], image.groups, image.width, n_pixels, ordered);
+    return ordered;
+  }
   COVARY_CHECK(image.data, "an image without values here has them on the device that it is made on");
   return device.upload(std::span(image.data, values));
 }

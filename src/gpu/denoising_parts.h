@@ -26,7 +26,8 @@ struct Groups {
   int pixels() const { return width * height; }
 };
 Groups upload(Device& device, const GroupedImage& image);
-/// The samples of an image on the device: in place if they are there (GroupedImage::on_device), otherwise a copy.
+/// The samples of an image on the device: where they are there already (GroupedImage::on_device), in place, or brought
+/// into its order; otherwise sent there.
 Buffer<float> samples_on(Device& device, const GroupedImage& image);
 
 /// Groups first, first + step, …

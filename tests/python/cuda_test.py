@@ -41,6 +41,9 @@ class OnDevice:
     def __del__(self):
         CUDA.cuMemFree_v2(self.address)
 
+    def __array__(self, *_, **__):
+        raise TypeError("can't convert it to numpy")  # as PyTorch says
+
     def __dlpack_device__(self):
         return self.kind, 0
 
@@ -78,18 +81,22 @@ class Cuda(PackageTest):
         self.assertEqual(covary.metrics.relmse(OnDevice(self.crn[0]), OnDevice(self.crn[1])),
                          covary.metrics.relmse(self.crn[0], self.crn[1]))
 
-    def test_samples_are_read_in_place(self):
-        """By estimators on the same device: they are not sent there again."""
-        for images, options in (((None, self.independent), {"oidn": "off"}),
-                                ((self.crn, self.independent), {"estimator": "iicv", "std_error": False})):
-            given = [None if image is None else OnDevice(by_pixels(image)) for image in images]
+    def test_samples_are_not_sent_again(self):
+        """To estimators on the same device, in any order in memory."""
+        of_mean, of_pair = {"oidn": "off"}, {"estimator": "iicv", "std_error": False}
+        for images, order, options in (((None, self.independent), by_pixels, of_mean),
+                                       ((None, self.independent), numpy.asarray, of_mean),
+                                       ((self.crn, self.independent), by_pixels, of_pair),
+                                       ((self.crn, self.independent), numpy.asfortranarray, of_pair)):
+            given = [None if image is None else OnDevice(order(image)) for image in images]
             results, written = [], []
             for pair_of_images in (given, images):
                 before = WRITTEN.value
                 results.append(covary.combine(*pair_of_images, device="cuda", **options).image)
                 written.append(WRITTEN.value - before)
             self.assert_same_bits(*results)
-            self.assertEqual(written[1] - written[0], sum(array.bytes for array in given if array))
+            # Besides samples, launches in parts send a few numbers, as often as the clock wants.
+            self.assertAlmostEqual((written[1] - written[0]) / sum(array.bytes for array in given if array), 1, 1)
 
     def test_network(self):
         """Runs on the device, too: the picture is the processor's to rounding."""

@@ -8,6 +8,17 @@
 #define LIMIT_RADIUS 3  // denoising/limited_groups.h
 #define BRIGHTER 6
 
+// Values whose groups, rows, pixels and channels lie so many floats apart, in the order of film/grouped_image.h.
+KERNEL in_order(GLOBAL const float* from, long of_groups, long of_rows, long of_pixels, long of_channels, int groups,
+                int width, int n_pixels, GLOBAL float* values) {
+  const int i = get_global_id(0);
+  if (i >= n_pixels) return;
+  GLOBAL const float* const pixel = from + i / width * of_rows + i % width * of_pixels;
+  for (int t = 0; t < groups; ++t)
+    for (int c = 0; c < 3; ++c)
+      values[((size_t)i * groups + t) * 3 + c] = pixel[t * of_groups + (c + PLANTED_BUG) % 3 * of_channels];
+}
+
 // 1 for pixels whose values are all usable.
 KERNEL usable_pixels(GLOBAL const float* data, int groups, int n_pixels, GLOBAL uchar* valid) {
   const int i = get_global_id(0);
