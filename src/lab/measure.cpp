@@ -14,6 +14,7 @@
 #include "core/parallel.h"
 #include "film/film_file.h"
 #include "film/image_file.h"
+#include "lab/cell_pairs.h"
 #include "lab/scene_images.h"
 #include "metrics/metrics.h"
 
@@ -124,38 +125,9 @@ std::vector<double> values_of(const Cell& cell, Value&& value) {
   return values;
 }
 
-double relmse(const RunResult& run) { return run.relmse; }
 double temporal(const RunResult& run) { return run.temporal; }
-double seconds(const RunResult& run) { return run.record.method_seconds(); }
-double processor(const RunResult& run) { return run.record.processor_seconds; }
 double mean_of(const std::vector<double>& values) { return mean_estimate(values).value; }
-
-/// Values of the runs of both cells, paired by seed.
-template <typename Value>
-Pairs in_pairs(const Cell& a, const Cell& b, Value&& value) {
-  Pairs pairs;
-  for (const RunResult& run : a.runs)
-    for (const RunResult& other : b.runs) {
-      if (run.seed != other.seed) continue;
-      pairs.seeds.push_back(run.seed);
-      pairs.a.push_back(value(run)), pairs.b.push_back(value(other));
-    }
-  return pairs;
-}
-
-Estimate ratio(const Pairs& pairs) { return ratio_of_means(pairs.a, pairs.b); }
-
-/// What the ratio to the baseline at equal samples is of.
-Pairs at_equal_samples(const Cell& base, const Cell& cell) {
-  if (!cell.equal_sample_normalised) return in_pairs(base, cell, relmse);
-  return in_pairs(base, cell, [](const RunResult& r) { return r.relmse * r.record.samples_per_pixel; });
-}
-
-/// The same at equal time. With a budget in seconds, the errors themselves are at equal time.
-Pairs at_equal_time(const Cell& base, const Cell& cell, const Budget& budget) {
-  if (budget.seconds > 0) return in_pairs(base, cell, relmse);
-  return in_pairs(base, cell, [](const RunResult& r) { return r.relmse * seconds(r); });
-}
+Estimate ratio(const Pairs& pairs) { return geometric_mean_of_ratios({&pairs, 1}); }
 
 size_t baseline_of(const Suite& suite) {
   size_t baseline = 0;
@@ -307,7 +279,8 @@ void measure(Cell& cell, const SceneInstance& scene, const SceneReferences& refe
   cell.estimate_seconds = mean_estimate(values_of(cell, [](const RunResult& r) { return r.record.estimate_seconds; }));
   cell.then_seconds = mean_estimate(values_of(cell, [](const RunResult& r) { return r.record.then_seconds; }));
   cell.method_seconds = mean_estimate(values_of(cell, seconds));
-  cell.processor_seconds = mean_estimate(values_of(cell, processor));
+  cell.processor_seconds =
+      mean_estimate(values_of(cell, [](const RunResult& r) { return r.record.processor_seconds; }));
   if (budget.seconds > 0) cell.time_ratio = cell.method_seconds.value / budget.seconds;
   cell.samples_per_pixel = mean_of(values_of(cell, [](const RunResult& r) { return r.record.samples_per_pixel; }));
   for (const RunResult& run : cell.runs)
@@ -369,9 +342,7 @@ void compare_cells(Results& results) {
       cell.clock_ratio = cell.method_seconds.value / base->method_seconds.value;
       cell.processor_ratio = cell.processor_seconds.value / base->processor_seconds.value;
     }
-    if (timed && budget.spp > 0)
-      cell.equal_processor_time =
-          ratio(in_pairs(*base, cell, [](const RunResult& r) { return r.relmse * processor(r); }));
+    if (timed && budget.spp > 0) cell.equal_processor_time = ratio(at_equal_processor_time(*base, cell));
     warn_of_busy_machine(cell, results);
     if (budget.seconds > 0) continue;
     const double taken = cell.samples_per_pixel, taken_by_base = base->samples_per_pixel;

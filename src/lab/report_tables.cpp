@@ -81,9 +81,9 @@ Json plot(const std::string& title, const std::string& x_label, Json series, con
           {"alt", alt}};
 }
 
-/// One line per method over its budgets in `unit`.
-template <typename X, typename Use>
-Json error_series(const Results& results, size_t scene, X&& x, Use&& use) {
+/// One line per method over its budgets in samples, or in seconds, of whose time trials are a part.
+template <typename X>
+Json error_series(const Results& results, size_t scene, bool in_samples, X&& x) {
   Json series = Json::array();
   for (size_t m = 0; m < results.suite.methods.size(); ++m) {
     Json line{{"name", results.suite.methods[m].name},
@@ -95,7 +95,8 @@ Json error_series(const Results& results, size_t scene, X&& x, Use&& use) {
     std::vector<const Cell*> cells;
     for (size_t b = 0; b < results.suite.budgets.size(); ++b) {
       const Cell* cell = results.find(scene, m, b);
-      if (cell && use(results.suite.budgets[b]) && cell->split.relative.error.value > 0) cells.push_back(cell);
+      const bool is_of_kind = (results.suite.budgets[b].spp > 0) == in_samples;
+      if (cell && is_of_kind && cell->split.relative.error.value > 0) cells.push_back(cell);
     }
     std::ranges::stable_sort(cells, {}, [&](const Cell* cell) { return x(*cell); });
     for (const Cell* cell : cells) {
@@ -293,17 +294,15 @@ Json slope_table(const Results& results) {
 
 Json convergence_plot(const Results& results, size_t scene) {
   const std::string& name = results.suite.scenes[scene].name;
-  Json series = error_series(
-      results, scene, [](const Cell& cell) { return cell.samples_per_pixel; },
-      [](const Budget& budget) { return budget.spp > 0; });
+  Json series = error_series(results, scene, true, [](const Cell& cell) { return cell.samples_per_pixel; });
   const std::string alt = alternative("relMSE of " + name + " from the fewest to the most samples", series);
   return plot(name, "samples per pixel", std::move(series), alt);
 }
 
 Json time_plot(const Results& results, size_t scene) {
   const std::string& name = results.suite.scenes[scene].name;
-  Json series = error_series(
-      results, scene, [](const Cell& cell) { return cell.method_seconds.value; }, [](const Budget&) { return true; });
+  const bool in_samples = std::ranges::count_if(results.suite.budgets, [](const Budget& b) { return b.spp > 0; }) > 1;
+  Json series = error_series(results, scene, in_samples, [](const Cell& c) { return c.method_seconds.value; });
   const std::string alt = alternative("relMSE of " + name + " from the shortest to the longest time", series);
   return plot(name, "seconds, render and estimate", std::move(series), alt);
 }

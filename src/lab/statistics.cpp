@@ -47,6 +47,13 @@ double jackknife_error(std::span<const double> parts) {
   return std::sqrt(squares * (n - 1) / n);
 }
 
+/// With a further independent error, normally distributed.
+Estimate widened(const Estimate& estimate, double standard_error) {
+  const double half = std::hypot(estimate.high - estimate.value, 1.96 * standard_error);
+  return {estimate.value, std::hypot(estimate.standard_error, standard_error), estimate.value - half,
+          estimate.value + half};
+}
+
 /// From the estimate of a logarithm.
 Estimate exponential(const Estimate& log) {
   const double value = std::exp(log.value);
@@ -91,12 +98,13 @@ Estimate ratio_of_means(std::span<const double> a, std::span<const double> b) {
 Estimate geometric_mean_of_ratios(std::span<const Pairs> items) {
   std::set<uint64_t> seeds;
   size_t fewest = SIZE_MAX;
-  double sum = 0;
+  double sum = 0, noise = 0;  // noise: variance of the sum
   for (const Pairs& item : items) {
     COVARY_CHECK(item.a.size() == item.seeds.size() && item.b.size() == item.seeds.size(), "values in pairs");
     seeds.insert(item.seeds.begin(), item.seeds.end());
     fewest = std::min(fewest, item.seeds.size());
     sum += log_ratio(item.a, item.b);
+    noise += item.noise * item.noise;
   }
   const double n = static_cast<double>(items.size());
   if (items.empty() || !std::isfinite(sum)) return {};
@@ -106,7 +114,8 @@ Estimate geometric_mean_of_ratios(std::span<const Pairs> items) {
     for (const Pairs& item : items) part += log_ratio(without(item, seed));
     parts.push_back(part / n);
   }
-  return exponential(with_interval(sum / n, jackknife_error(parts), fewest < 2 ? 0 : static_cast<int>(fewest) - 1));
+  const int dof = fewest < 2 ? 0 : static_cast<int>(fewest) - 1;
+  return exponential(widened(with_interval(sum / n, jackknife_error(parts), dof), std::sqrt(noise) / n));
 }
 
 double geometric_mean(std::span<const double> values) {

@@ -35,6 +35,7 @@ Estimate jackknife(double value, size_t n, const std::function<double(size_t)>& 
 struct Pairs {
   std::vector<uint64_t> seeds;
   std::vector<double> a, b;
+  double noise = 0;  ///< further standard error of log(mean(a) / mean(b)), alike for all seeds
 };
 
 /// mean(a) / mean(b); jackknife of the logarithm. NaN if a mean is not positive.
@@ -42,8 +43,9 @@ Estimate ratio_of_means(std::span<const double> a, std::span<const double> b);
 
 /// Geometric mean over `items` of mean(a) / mean(b); jackknife of the logarithm over the seeds, each of which is left
 /// out of all items at once, because what it draws may have the same effect on all of them. The items are fixed, not
-/// drawn from a population. Student's t has as many degrees of freedom as the item with the fewest seeds. NaN if a mean
-/// is not positive, or without items.
+/// drawn from a population. Student's t has as many degrees of freedom as the item with the fewest seeds; noise of the
+/// items, independent of the seeds and of one another, widens the interval. NaN if a mean is not positive, or without
+/// items.
 Estimate geometric_mean_of_ratios(std::span<const Pairs> items);
 
 /// NaN without values or if one is not positive.

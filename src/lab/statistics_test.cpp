@@ -89,6 +89,21 @@ TEST(Statistics, GeometricMeanOfOneRatio) {
   EXPECT_TRUE(std::isnan(geometric_mean_of_ratios(std::array{items[0], Pairs{{1, 2}, {8, -9}, {1, 1}}}).value));
 }
 
+/// Noise of the references, of which the seeds tell nothing.
+TEST(Statistics, RatiosAreWidenedByNoiseOfAllSeeds) {
+  Pairs pairs{{1, 2, 3}, {8, 8, 8}, {1, 1, 1}, 0.5};
+  const Estimate one = geometric_mean_of_ratios({&pairs, 1});
+  EXPECT_NEAR(one.value, 8, 1e-12);
+  EXPECT_NEAR(one.standard_error, 4, 1e-12);
+  EXPECT_NEAR(one.high, 8 * std::exp(0.98), 1e-9);
+  EXPECT_NEAR(one.low, 8 * std::exp(-0.98), 1e-9);
+  EXPECT_NEAR(geometric_mean_of_ratios(std::array{pairs, pairs}).high, 8 * std::exp(0.98 / std::sqrt(2.0)), 1e-9);
+  pairs.b = {1, 1.1, 0.9};
+  const Estimate seeds = geometric_mean_of_ratios(std::array{Pairs{pairs.seeds, pairs.a, pairs.b}});
+  const Estimate both = geometric_mean_of_ratios({&pairs, 1});
+  EXPECT_NEAR(std::log(both.high / both.value), std::hypot(std::log(seeds.high / seeds.value), 0.98), 1e-9);
+}
+
 // Errors of K seeds in four scenes, with a relative noise of 5, 10, 20 and 30 %, half of whose variance all scenes have
 // in common, as from common random numbers. N = 4000 experiments; binomial standard deviation 0.34 %, alpha = 1e-5:
 // 1.5 %, and 1 % because logarithms of means of so noisy values are not exactly normal. With 1.96 in place of Student's
