@@ -27,6 +27,7 @@
 #include "lab/time_estimate.h"
 #include "progress.h"
 #include "render_options.h"
+#include "unknown_argument.h"
 #include "version.h"
 
 namespace covary {
@@ -49,15 +50,20 @@ RenderOptions parsed(std::vector<std::string> words, bool of_frames) {
   words.insert(words.end(), {"scene.xml", "-o", "out_#.exr"});
   if (of_frames) words.insert(words.end(), {"--frames", "1"});
   std::reverse(words.begin(), words.end());
-  command.parse(words);
+  try {
+    command.parse(words);
+  } catch (const CLI::ExtrasError&) {
+    const std::string text = unknown_argument(command, "covary render");
+    const bool is_option = text.starts_with("unknown option");
+    throw Error(ErrorCode::kUsage, is_option ? text : fmt::format("'{}' belongs to no option", options.scene));
+  }
   return options;
 }
 
 /// The experiment's progress, on a separate line, with the time left while a run takes long; failures stay above it.
 void show_progress(const lab::Progress& p, const std::string& name, ProgressLine& line) {
   if (p.kind == lab::Progress::Kind::kFailed) {
-    line.clear();
-    fmt::print(stderr, "failed: {}{}\n", name, p.what);
+    line.print(fmt::format("failed: {}{}", name, p.what));
     return;
   }
   if (p.total == 0) return line.show([p, name] { return name + p.what; });  // before the runs are known
@@ -100,9 +106,16 @@ std::string read_file(const std::string& path) {
 }
 
 void check_scenes(const lab::Suite& suite, const std::string& name, const std::string& folder) {
-  const auto is_there = [&](const lab::SceneEntry& scene) { return fs::exists(fs::path(folder) / scene.file); };
-  if (suite.scenes.empty() || std::ranges::any_of(suite.scenes, is_there) || !lab::builtin_suites().contains(name))
-    return;
+  std::vector<std::string> missing;
+  for (const lab::SceneEntry& scene : suite.scenes)
+    for (const std::string& file : lab::located(scene, folder).scene_files())
+      if (!fs::exists(file)) missing.push_back(file);
+  if (missing.empty()) return;
+  if (!lab::builtin_suites().contains(name))
+    throw Error(ErrorCode::kIo,
+                fmt::format("'{}': there {} no {}; --scenes names the folder that the suite's files are in", name,
+                            missing.size() == 1 ? "is" : "are", fmt::join(missing, ", no ")));
+  if (missing.size() < suite.scenes.size()) return;  // the others can be compared
   throw Error(ErrorCode::kIo,
               fmt::format("'{0}' has none of the scenes of {1}; `covary scenes {1} --folder {0}` says which "
                           "are missing, and `covary scenes {1}` where they come from",

@@ -32,6 +32,7 @@
 #include "interruption.h"
 #include "io/scene_formats.h"
 #include "method_options.h"
+#include "unknown_argument.h"
 #include "version.h"
 
 namespace covary {
@@ -68,21 +69,6 @@ int report(const char* program, const Error& error) {
   return error.code() == ErrorCode::kInput ? EX_DATAERR : error.code() == ErrorCode::kIo ? EX_IOERR : EX_SOFTWARE;
 }
 
-/// Long options of `command` that `given` may mean, misspelt or abbreviated. Compared without dashes, which would make
-/// all short names similar.
-std::vector<std::string> near_options(const CLI::App& command, const std::string& given) {
-  std::vector<std::string> names;
-  for (const CLI::Option* option : command.get_options())
-    names.insert(names.end(), option->get_lnames().begin(), option->get_lnames().end());
-  const std::string bare = given.substr(std::min(given.find_first_not_of('-'), given.size()));
-  if (bare.size() < 2) return {};  // every short name is similar to a single letter
-  std::vector<std::string> near = nearest_names(bare, names);
-  if (near.empty())
-    std::copy_if(names.begin(), names.end(), std::back_inserter(near), [&](auto& n) { return n.starts_with(bare); });
-  for (std::string& name : near) name.insert(0, "--");
-  return near;
-}
-
 /// The message about an option given more often than it may be, in plain words; other messages as they are.
 std::string in_plain_words(const std::string& message) {
   std::smatch found;
@@ -100,19 +86,7 @@ std::string scene_without_command(const std::string& word) {
 /// What is wrong with the first argument that no option takes; "" if there is none.
 std::string describe_extra(const CLI::App& app) {
   const CLI::App& command = app.get_subcommands().empty() ? app : *app.get_subcommands()[0];
-  const std::string name = &command == &app ? "covary" : "covary " + command.get_name();
-  const std::vector<std::string> extras = app.remaining(true);
-  if (extras.empty()) return "";
-  const std::string extra = extras[0].substr(0, extras[0].find('='));
-  const std::string help = "; see '" + name + " --help'";
-  if (!extra.starts_with('-')) return "too many arguments, beginning with '" + extra + "'" + help;
-  if (const std::string present =
-          present_form(extra.substr(std::min(extra.find_first_not_of('-'), extra.size())), command);
-      !present.empty())
-    return fmt::format("unknown option '{}': write {}{}", extra, present, help);
-  const std::vector<std::string> near = near_options(command, extra);
-  const std::string question = near.empty() ? "" : fmt::format("; did you mean '{}'?", fmt::join(near, "' or '"));
-  return "unknown option '" + extra + "'" + (question.empty() ? help : question + " See" + help.substr(5));
+  return unknown_argument(command, &command == &app ? "covary" : "covary " + command.get_name());
 }
 
 int run(int argc, char** argv) {

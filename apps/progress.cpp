@@ -211,6 +211,13 @@ void ProgressLine::erase() {
   drawn_ = false;
 }
 
+void ProgressLine::print(const std::string& line) {
+  const std::lock_guard lock(mutex_);
+  erase();
+  std::fprintf(stderr, "%s\n", line.c_str());
+  if (file_of_caller()) write_to_caller(line);
+}
+
 void ProgressLine::clear() {
   const std::lock_guard lock(mutex_);
   erase();

@@ -46,6 +46,8 @@ class ProgressLine {
   void toward(const PredictedError& reached);
   /// Shows this text instead, asked for whenever the line is drawn.
   void show(std::function<std::string()> text);
+  /// Prints a line that stays, also for a program that runs this one.
+  void print(const std::string& line);
   /// Clears the line (terminal) before other output.
   void clear();
   /// Clears it for good.

@@ -29,7 +29,7 @@ from ._arguments import (
 from ._combine import PROGRESS
 from ._identity import Unknown, identity_of
 from ._images import read_image
-from ._program import failure, run_program
+from ._program import FAILED, failure, run_program
 from ._result import AXES, new_axes
 from .errors import InputError, _warn
 from .film import Film
@@ -258,6 +258,8 @@ class _Runs:
         found = re.match(r"\[(\d+)/(\d+)", text)
         if found:
             self._tell(int(found[1]), int(found[2]))
+        elif text.startswith(FAILED):
+            _warn(text)
 
     def end(self) -> None:
         """All are there."""
@@ -278,8 +280,8 @@ class _Log:
 
     def __call__(self, text: str) -> None:
         found = re.match(r"\[(\d+)/", text)
-        if found and found[1] != self._run:
-            self._run = found[1]
+        if (found and found[1] != self._run) or text.startswith(FAILED):
+            self._run = found[1] if found else self._run
             print(text, file=sys.stderr, flush=True)
 
 
@@ -323,8 +325,10 @@ def experiment(suite: str | PathLike[str] | dict[str, Any], output: str | PathLi
     progress: True for a line of text, the default on a terminal and in notebooks; False for none; or a function, called
         with (done, total) runs.
 
-    Raises InputError if runs failed, with their messages; those that did not are kept.
+    Raises InputError if runs failed, with their messages, which are also warned of when they fail; those that did not
+    are in the error's `experiment`.
     """
+    begun = time.time_ns()
     given = {**(methods or {}), **(renderers or {})}
     words = [word for option, some in (("--program", methods), ("--renderer", renderers))
              for name, method in (some or {}).items() for word in (option, _program_of(name, method))]
@@ -341,12 +345,15 @@ def experiment(suite: str | PathLike[str] | dict[str, Any], output: str | PathLi
         with ended(watcher):
             code, _, errors = run_program("experiment", suite, "-o", output, *([] if watcher else ["--quiet"]), *words,
                                           *(options or []), progress=watcher)
+    made = Path(output) / "results.json"
     if code:
-        raise failure(code, errors.replace(f"{made_file}:", "suite:"), InputError)
+        error = failure(code, errors.replace(f"{made_file}:", "suite:"), InputError)
+        if made.is_file() and made.stat().st_mtime_ns >= begun:
+            error.experiment = Experiment(made.parent, json.loads(made.read_text(encoding="utf-8")))
+        raise error
     if isinstance(watcher, _Runs):
         watcher.end()
-    made = Path(output)
-    found = Experiment(made, json.loads((made / "results.json").read_text(encoding="utf-8")))
+    found = Experiment(made.parent, json.loads(made.read_text(encoding="utf-8")))
     for warning in found.warnings:
         _warn(warning)
     return found

@@ -48,18 +48,22 @@ def run_program(*words: str | os.PathLike[str],
 
 
 def _tell_lines(file: Path, progress: Callable[[str], object], end: threading.Event) -> None:
-    """Tells the newest line of the file, as often as there is one, until the end."""
+    """Tells the newest line of the file, and all that tell of failures, as often as there are any, until the end."""
     with file.open(encoding="utf-8", errors="replace") as lines:
         told = ""
         while True:
             is_last = end.wait(_LOOK_SECONDS)
-            newest = "".join(lines.readlines()[-1:]).rstrip("\n")
-            if newest and newest != told:
-                told = newest
-                progress(told)
+            new = [line.rstrip("\n") for line in lines.readlines()]
+            for line in [line for line in new[:-1] if line.startswith(FAILED)] + new[-1:]:
+                if line != told:
+                    told = line
+                    progress(line)
             if is_last:
                 return
 
+
+#: How a line begins that tells of a failed run.
+FAILED = "failed: "
 
 #: Of exit codes; the last three as in sysexits.h.
 _CLASSES = {2: UsageError, 65: InputError, 74: IoError, 70: InternalError}

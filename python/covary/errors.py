@@ -6,10 +6,14 @@ TypeError and ValueError; Ctrl-C raises KeyboardInterrupt."""
 import os
 import sys
 import warnings
+from typing import Any
 
 
 class Error(Exception):
     """Any error of covary."""
+
+    #: Of experiment(), if runs failed: an Experiment of those that did not.
+    experiment: Any = None
 
 
 class UsageError(Error, ValueError):
@@ -17,7 +21,7 @@ class UsageError(Error, ValueError):
 
 
 class InputError(Error, ValueError):
-    """The content of a file or an image is wrong or not supported."""
+    """The content of a file or an image is wrong or not supported, or a run of experiment() failed."""
 
 
 class IoError(Error, OSError):

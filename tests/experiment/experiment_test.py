@@ -393,7 +393,8 @@ class Resume(ExperimentTest):
 
 class Failures(ExperimentTest):
     def test_the_rest_goes_on(self):
-        self.suite["scenes"].append({"name": "gone", "file": "gone.xml"})
+        (self.path / "gone.xml").write_text("<scene")
+        self.suite["scenes"].append({"name": "gone", "file": str(self.path / "gone.xml")})
         self.suite["methods"].append({"name": "wrong", "options": ["--estimator", "iicv", "--groups", "2"]})
         self.suite["methods"].append({"name": "late", "options": ["--estimator", "none"],
                                       "then": [["merge", "nothing.exr"]]})
@@ -409,6 +410,13 @@ class Failures(ExperimentTest):
         self.assertIn("2 groups are too few", failures["room", "wrong"]["message"])
         self.assertIn("nothing.exr", failures["room", "late"]["message"])
         self.assertIn("failed: gone", self.stderr)
+
+    def test_scenes_that_are_missing_are_told_at_once(self):
+        self.suite["scenes"] += [{"name": name, "file": f"{name}.xml"} for name in ("gone", "away")]
+        done = self.run_covary(self.command())
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stderr, r"^covary: 'suite.json': there are no .*gone.xml, no .*away.xml; --scenes names ")
+        self.assertFalse((self.path / "out" / "cache").exists())
 
 
 class Programs(ExperimentTest):
@@ -536,7 +544,8 @@ class Programs(ExperimentTest):
 class Mistakes(ExperimentTest):
     def test_methods_that_render_refuses(self):
         refused = ((["--estimator", "iidw"], "; did you mean 'iduw' or 'iicv'?"),
-                   (["--windwo", "3"], "--windwo"),
+                   (["--windwo", "3"], "method 'wrong': unknown option '--windwo'"),
+                   (["--estimater", "iicv"], "unknown option '--estimater'; did you mean '--estimator'?"),
                    (["--estimator", "iduw", "--set", "k=3"], "--set k is an option of --estimator iicv, cv-baseline"),
                    (["--set", "k=-3"], "--set k: '-3': expected a whole number of at least 1"))
         for options, message in refused:
@@ -619,7 +628,7 @@ class Foreign(ExperimentTest):
         self.suite["common_options"] = ["--aovs", "--json", "x"]
         self.refused("common_options[1]: --json", "'x' names a file")
         self.suite["common_options"] = ["other.xml"]  # a scene of its own
-        self.bad(2, "argument was not expected: scene.xml")
+        self.bad(2, "'other.xml' belongs to no option")
 
     def test_commands_after_the_render(self):
         for step, place, message in ((["denoise", "--oidn", "evil.so"], "[0][1]", "--oidn 'evil.so' names a library"),

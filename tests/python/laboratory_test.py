@@ -7,6 +7,7 @@ import re
 import sys
 import threading
 import unittest
+import warnings
 
 import covary
 import numpy
@@ -189,6 +190,19 @@ class Experiments(PackageTest):
             covary.InputError, self.experiment, flat=lambda samples: numpy.zeros(3)))
         self.assertIn("the function returned None", self.message_of(
             covary.InputError, self.experiment, none=lambda samples: None))
+
+    def test_failures_are_told_when_they_happen(self):
+        """The error has the runs that did not fail."""
+        def wrong(samples):
+            raise ValueError("no idea")
+
+        with warnings.catch_warnings(record=True) as told, self.assertRaises(covary.InputError) as raised:
+            warnings.simplefilter("always")
+            covary.experiment(SUITE, self.path / "out", scenes=ROOM.parent, methods={"wrong": wrong},
+                              progress=lambda *runs: None)
+        self.assertTrue(any(str(w.message).startswith("failed: room, wrong, 16 spp: ") for w in told), told)
+        found = raised.exception.experiment
+        self.assertEqual({row["method"] for row in found.table}, {method["name"] for method in SUITE["methods"]})
 
     def test_the_same_image_for_all_seeds_is_told(self):
         warnings = self.experiment(flat=lambda samples: numpy.full((24, 32, 3), 0.4)).results["warnings"]
