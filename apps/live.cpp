@@ -67,6 +67,7 @@ void follow(const LiveOptions& options, const std::string& path) {
   const StopFlag stop;
   LiveFiles files(options.port(), path);
   announce(files.page());
+  if (const std::string text = files.waiting(); !text.empty()) fmt::print(stderr, "live: {}\n", text);
   files.run(*stop.token());
 }
 

@@ -36,13 +36,17 @@ double fall_of(const RenderOptions& options) {
   return estimator_of(options).pair() ? kFallOfPairs : kFallOfMeans;
 }
 
-/// ": `--spp 64` halves it", ": about 2.8 % with `--spp 64`"; empty if so many samples are too many.
+/// "; `--resume --spp 64` halves it", "; a new render of `--spp 64` leaves about 2.8 %" where samples are not kept;
+/// empty if so many samples are too many.
 std::string more_samples(const RenderReport& report, double relmse) {
   const double samples = std::round(report.result.samples_per_pixel());
   if (samples < 1 || 4 * samples > kMaxSamples || report.options.request().until > 0) return "";
   const double factor = std::pow(4, -fall_of(report.options) / 2);
-  if (factor <= 0.5) return fmt::format("; `--spp {:g}` halves it", 4 * samples);
-  return fmt::format("; `--spp {:g}` leaves about {}", 4 * samples, percent_text(relmse * factor * factor));
+  const bool keeps_samples = !report.options.request().passes.empty() || report.result.image.estimate.data.empty();
+  const std::string what = fmt::format(
+      fmt::runtime(keeps_samples ? "; `--resume --spp {:g}`" : "; a new render of `--spp {:g}`"), 4 * samples);
+  if (factor <= 0.5) return what + " halves it";
+  return fmt::format("{} leaves about {}", what, percent_text(relmse * factor * factor));
 }
 
 std::string samples_text(const RenderResult& result) {

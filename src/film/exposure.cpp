@@ -8,6 +8,7 @@ namespace covary {
 namespace {
 
 constexpr double kBurnt = 1.001, kBlack = 0.0015;
+constexpr double kDarkestMedian = 0.09;  // one stop below middle grey
 constexpr int kMaxHalfStops = 60;
 
 }  // namespace
@@ -31,15 +32,19 @@ double exposure_for_display(const Image& linear) {
   const auto is_good = [&](double stops) {
     return static_cast<double>(n_lost(stops)) <= 0.1 * static_cast<double>(logs.size());
   };
-  for (int half = 0; half <= kMaxHalfStops; ++half)
+  const double darkest = std::min(0.0, std::log2(kDarkestMedian) - logs[logs.size() / 2]);
+  for (int half = 0; half <= kMaxHalfStops && -half / 2.0 >= darkest; ++half)
     if (is_good(-half / 2.0)) return half == 0 ? 0 : -half / 2.0;
-  const double key = std::log2(0.18) - sum / static_cast<double>(logs.size());
+  const bool is_dark = darkest == 0;
+  const double wanted = is_dark ? std::log2(0.18) - sum / static_cast<double>(logs.size()) : 0;
   double best = 0;
   auto fewest = n_lost(0);
   for (int half = -kMaxHalfStops; half <= kMaxHalfStops; ++half) {
     const double stops = half / 2.0;
+    if (stops < darkest) continue;
     const auto lost = n_lost(stops);
-    if (lost < fewest || (lost == fewest && std::abs(stops - key) < std::abs(best - key))) best = stops, fewest = lost;
+    if (lost < fewest || (lost == fewest && std::abs(stops - wanted) < std::abs(best - wanted)))
+      best = stops, fewest = lost;
   }
   return best;
 }

@@ -42,6 +42,15 @@ TEST(Exposure, BringsEverythingIntoTheRange) {
   EXPECT_GT(2 * std::exp2(stops), 0.0015);
 }
 
+/// A dark room with a window, and a model with a lamp: they stay visible.
+TEST(Exposure, DoesNotDarkenPicturesForTheirLamps) {
+  std::vector<float> values(80, 0.2f);
+  values.resize(100, 50);
+  EXPECT_EQ(exposure_for_display(grey(values)), 0);
+  for (size_t i = 80; i < 90; ++i) values[i] = 1.3f;  // which half a stop brings back
+  EXPECT_EQ(exposure_for_display(grey(values)), -0.5);
+}
+
 TEST(Exposure, NumbersThatAreNoneAreLeftOut) {
   std::vector<float> values(10, 8);
   values.push_back(NAN), values.push_back(INFINITY);

@@ -72,6 +72,8 @@ LiveFiles::LiveFiles(int port, std::string path)
   page_.say({{"kind", "files"}, {"pictures", Json::array()}, {"phase", waiting_for(path_)}});
 }
 
+std::string LiveFiles::waiting() const { return fs::exists(path_) ? "" : waiting_for(path_); }
+
 /// The newest ones, by name.
 std::vector<fs::path> LiveFiles::files() const {
   std::vector<fs::path> paths;

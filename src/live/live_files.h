@@ -24,6 +24,8 @@ class LiveFiles {
   LiveFiles(int port, std::string path);
 
   const LivePage& page() const { return page_; }
+  /// That the files are waited for; "" if there are any.
+  std::string waiting() const;
 
   /// Reads what has changed since the last call, and shows it. Files that cannot be read are named on the page.
   void look();

@@ -67,7 +67,9 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
   if (!request.preview) return;
   const Image picture = result.picture();
   result.preview_stops = request.exposure == kAutomaticExposure ? exposure_for_display(picture) : request.exposure;
-  write_png(preview_path(request.output), result.preview_stops == 0 ? picture : exposed(picture, result.preview_stops));
+  const auto alpha = aovs.find(kAlpha);
+  write_png(preview_path(request.output), result.preview_stops == 0 ? picture : exposed(picture, result.preview_stops),
+            alpha != aovs.end() ? alpha->second : Image());
 }
 
 }  // namespace covary

@@ -103,7 +103,8 @@ class Summary(CliTest):
         facts = json.loads((self.path / "a.json").read_text())
         self.assertEqual(lines[-4], "a.exr: 120 x 80 pixels, 16 samples per pixel; a.png to look at")
         self.assertRegex(lines[-3], r"^time: [\d.]+ s: ((loading|auxiliary images) [\d.]+ s, .*)?samples [\d.]+ s")
-        left = re.match(r"how good: about ([\d.]+) % (?:grain|error) left; `--spp 64` leaves about ([\d.]+) %$",
+        left = re.match(r"how good: about ([\d.]+) % (?:grain|error) left; a new render of `--spp 64` leaves about "
+                        r"([\d.]+) %$",
                         lines[-2])
         self.assertTrue(left, lines[-2])
         percent = 100 * facts["predicted_relmse"] ** 0.5
@@ -119,7 +120,8 @@ class Summary(CliTest):
 
     def test_the_mean_is_halved_by_four_times_the_samples(self):
         said = self.good(*RENDER, "--spp", "16", "--estimator", "none", "--groups", "8", "-o", "a.exr").stderr
-        self.assertRegex(said, r"(?m)^how good: about [\d.]+ % grain left( \(unsure.*\))?; `--spp 64` halves it$")
+        self.assertRegex(said, r"(?m)^how good: about [\d.]+ % grain left( \(unsure.*\))?; "
+                               "`--resume --spp 64` halves it$")
         self.assertRegex(self.good(*RENDER, "--spp", "16", "--estimator", "none", "-o", "b.exr").stderr,
                          "(?m)^how good: unknown, as no error is predicted here$")
 

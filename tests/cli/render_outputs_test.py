@@ -87,6 +87,8 @@ class Alpha(RenderTest):
         self.good(*command, "-o", "part.exr", "--alpha", "--crop", "8,8,16,16", "--quiet")
         part = read_exr((self.path / "part.exr").read_bytes())["A"]
         self.assertEqual(part, [alpha[32 * (y + 8) + x + 8] for y in range(16) for x in range(16)])
+        rendered = (self.path / "ball.png").read_bytes()
+        self.assertEqual(rendered[25], 6, "colour type RGBA of the picture to look at")
         self.good("convert", "ball.exr", "ball.png", "--overwrite")
 
 

@@ -66,6 +66,7 @@ const bar = el("progress", { max: 1, "aria-label": "Progress" });
 const place = { comparer: el("div", { class: "part" }), plot: el("div", { class: "plots" }) };
 
 function build() {
+  for (const element of [bar, ...Object.values(buttons)]) element.hidden = true;  // until it is known what there is
   document.body.classList.add("plain", "live");
   document.getElementById("head").append(el("h1", {}, document.title), phase, bar, numbers,
     el("div", { class: "bar buttons", role: "group", "aria-label": "Render" }, Object.values(buttons)));
