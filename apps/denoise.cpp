@@ -82,13 +82,6 @@ void check_options(const DenoiseCommand& o) {
     usage("--clean-features is an option of --mode oidn; mixtures always denoise their auxiliary features first");
 }
 
-void warn_of_unfinished(const std::vector<std::string>& inputs) {
-  for (const std::string& path : inputs)
-    if (is_unfinished(inspect_image(path)))
-      fmt::print(stderr, "warning: {}: the render was interrupted; the same `covary render` with --resume ends it\n",
-                 printable(path));
-}
-
 /// The samples; null if the network takes the image alone. The next frame's are read from then on.
 std::shared_ptr<const FrameFile> frame_of(const DenoiseCommand& o, const DenoiseTask& task) {
   if (is_by_network(o)) return nullptr;

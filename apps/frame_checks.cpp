@@ -26,7 +26,21 @@ bool is_unfinished(const ImageInfo& image) {
   return found != image.attributes.end() && found->second == "false";
 }
 
+void warn_of_unfinished(const std::vector<std::string>& inputs) {
+  for (const std::string& path : inputs)
+    if (is_unfinished(inspect_image(path)))
+      fmt::print(stderr, "warning: {}: the render was interrupted; the same `covary render` with --resume ends it\n",
+                 printable(path));
+}
+
 namespace {
+
+/// Whether nothing more will be written to the file, as far as can be told: a file of another format is not waited for.
+bool is_finished(const std::string& path) {
+  std::error_code ignored;
+  const bool has_content = std::filesystem::file_size(path, ignored) > 0 && !ignored;
+  return is_finished_exr(path) || (has_content && !is_exr(path));
+}
 
 /// The header of a frame's file, or why it cannot be read.
 struct Header {
@@ -37,7 +51,9 @@ struct Header {
 
 Header header_of(int frame, const std::string& path) {
   try {
-    return {frame, inspect_image(path), ""};
+    Header header{frame, inspect_image(path), ""};
+    if (!is_finished(path)) header.problem = fmt::format("'{}' is cut off, or still being written", path);
+    return header;
   } catch (const Error& error) {
     return {frame, {}, error.what()};
   }
@@ -79,13 +95,6 @@ std::string problem_of(const std::string& path, const Header& header, const Head
   return "";
 }
 
-/// Whether nothing more will be written to the file, as far as can be told: a file of another format is not waited for.
-bool is_finished(const std::string& path) {
-  std::error_code ignored;
-  const bool has_content = std::filesystem::file_size(path, ignored) > 0 && !ignored;
-  return is_finished_exr(path) || (has_content && !is_exr(path));
-}
-
 }  // namespace
 
 std::vector<std::string> read_patterns(const FramePatterns& patterns) {
@@ -93,6 +102,19 @@ std::vector<std::string> read_patterns(const FramePatterns& patterns) {
   for (const std::string& other : patterns.others)
     if (!other.empty() && is_frame_pattern_of_input(other)) all.push_back(other);
   return all;
+}
+
+std::string text_of_unfinished(const std::vector<int>& frames, const FramePatterns& patterns) {
+  constexpr size_t kMaxNamed = 5;
+  std::vector<std::string> all;
+  for (const int frame : frames)
+    for (const std::string& pattern : read_patterns(patterns)) {
+      const std::string path = frame_name(pattern, frame);
+      if (!is_finished(path)) all.push_back(path + (std::filesystem::exists(path) ? " is unfinished" : " is missing"));
+    }
+  const size_t more = all.size() - std::min(all.size(), kMaxNamed);
+  all.resize(all.size() - more);
+  return fmt::format("{}{}", fmt::join(all, ", "), more > 0 ? fmt::format(", and {} more", more) : "");
 }
 
 std::vector<int> take_unfinished(std::vector<int>& frames, const FramePatterns& patterns) {

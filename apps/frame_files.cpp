@@ -180,9 +180,8 @@ class Frames {
       problems.push_back(fmt::format("{} of {} failed: {}{}", failed_.size(), counted(n_all, "frame"), text_of(failed_),
                                      o_.watch ? "; --resume tries again" : ""));
     if (!left.empty())
-      problems.push_back(fmt::format("{} of {} incomplete: {}; files of '{}' are missing or unfinished", left.size(),
-                                     counted(n_all, "frame"), text_of(left),
-                                     fmt::join(read_patterns(patterns_), "', '")));
+      problems.push_back(fmt::format("{} of {} incomplete: {}; {}", left.size(), counted(n_all, "frame"), text_of(left),
+                                     text_of_unfinished(left, patterns_)));
     if (!problems.empty()) throw Error(ErrorCode::kInput, fmt::format("{}", fmt::join(problems, "; ")));
   }
 

@@ -18,6 +18,7 @@
 #include "film/image_file.h"
 #include "film/merge.h"
 #include "film/outputs.h"
+#include "frame_checks.h"
 #include "plans/plan.h"
 #include "progress.h"
 #include "sequences/frame_names.h"
@@ -136,6 +137,7 @@ void merge(const MergeOptions& options) {
   outputs.reads(options.inputs);
   outputs.writes_result("-o", options.output, OutputKind::kFilm, "merge", options.overwrite);
   Film merged = merged_films(options);
+  warn_of_unfinished(options.inputs);
   merged.attributes[film_key::kVersion] = COVARY_VERSION;
   merged.attributes[film_key::kCommand] = command_line();
   write_film(options.output, merged, mean_of_groups(rows_of(merged, 0, merged.height())).std_error);

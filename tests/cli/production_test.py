@@ -54,7 +54,7 @@ class LongSequence(CliTest):
         self.assertEqual(result.returncode, 1)
         self.assertIn("note: 'a.####.exr' has no frame 77\n", result.stderr)
         self.assertRegex(result.stderr, r"\n\d+ frames in [\d.]+ s; \d+ existed already: ")
-        self.assertIn("2 of 239 frames incomplete: 40, 160; files of ", result.stderr)
+        self.assertRegex(result.stderr, r"2 of 239 frames incomplete: 40, 160; [ab].0040.exr is .*, [ab].0160.exr is ")
         good = [n for n in frames if n not in self.BAD]
         self.assertEqual(sorted(p.name for p in self.path.glob("o.*.exr")), [f"o.{n:04d}.exr" for n in good])
         for name, time_of in before.items():
@@ -89,8 +89,8 @@ class SlowFarm(CliTest):
         self.assertEqual(result.returncode, 1, result.stderr)
         self.assertIn("waiting for frames 'a.####.exr'; Ctrl-C, or 6 s without a new frame, ends, and --resume "
                       "continues\n", result.stderr)
-        self.assertIn("covary: 1 of 4 frames incomplete: 4; files of 'a.####.exr', 'b.####.exr' are missing or "
-                      "unfinished\n", result.stderr)
+        self.assertRegex(result.stderr, r"covary: 1 of 4 frames incomplete: 4; ([ab].0004.exr is (missing|unfinished)"
+                                        r"(, )?)+\n")
         self.assertRegex(result.stderr, r"\n3 frames in [\d.]+ s\n")
         for n in (1, 2, 3):
             self.write("x.exr", frames["a", n])
@@ -108,6 +108,7 @@ class UnfinishedFarm(CliTest):
         self.write("b.0001.exr", noisy("b1"))
         self.write("b.0003.exr", noisy("b3")[:700])
         message = self.bad(1, "b.0002.exr", *DENOISE).stderr
+        self.assertIn("b.0003.exr: is damaged or cut off", message)
         self.assertIn("nothing was written. --resume leaves out such frames, and those whose files are missing or "
                       "unfinished", message)
         self.assertEqual(list(self.path.glob("o.*")), [])
@@ -115,8 +116,8 @@ class UnfinishedFarm(CliTest):
             result = self.run_covary(*DENOISE, "--resume")
             self.assertEqual(result.returncode, 1, result.stderr)
             self.assertIn(more, result.stderr)
-            self.assertIn("covary: 2 of 3 frames incomplete: 2-3; files of 'a.####.exr', 'b.####.exr' are missing "
-                          "or unfinished\n", result.stderr)
+            self.assertIn("covary: 2 of 3 frames incomplete: 2-3; b.0002.exr is missing, b.0003.exr is unfinished\n",
+                          result.stderr)
             self.assertEqual([p.name for p in self.path.glob("o.*")], ["o.0001.exr"])
         for n in (2, 3):
             self.write(f"b.{n:04d}.exr", noisy(f"b{n}"))
