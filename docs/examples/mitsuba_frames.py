@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""mitsuba_frames.py SCENE.xml PATH.json FRAMES [SAMPLES]: frames by Mitsuba 3 along a camera path, as `covary render
---camera-path` reads it, with two seeds: a_0001.exr and b_0001.exr and so on. Then:
+"""mitsuba_frames.py SCENE.xml PATH.json FRAMES [SAMPLES] [NAME=VALUE ...]: frames by Mitsuba 3 along a camera path, as
+`covary render --camera-path` reads it, with two seeds: a_0001.exr and b_0001.exr and so on. Then:
 
     covary denoise a_####.exr b_####.exr -o out_####.exr
 
@@ -46,12 +46,15 @@ def motion_layers(points, hit, now, before, fov):
     return [numpy.where(hit, value, 0) for value in (old_x - x, old_y - y, old_depth - depth, depth)]
 
 
-def main(scene_file, path_file, frames, samples=16):
+def main(scene_file, path_file, frames, samples=16, **parameters_of_scene):
     path = json.load(open(path_file))
     rate = path.get("frames_per_second", 1)
-    scene = mi.load_file(scene_file)
+    scene = mi.load_file(scene_file, **parameters_of_scene)
     sensor = scene.sensors()[0]
     parameters = mi.traverse(sensor)
+    if sensor.film().rfilter().radius() > 0.5:
+        print("the pixel filter is wider than a pixel, which leaves blotches: write <rfilter type=\"box\"/> in the "
+              "<film>", file=sys.stderr)
     fov = float(numpy.asarray(parameters["x_fov"]).ravel()[0])
     integrator = mi.load_dict({"type": "aov", "aovs": "albedo:albedo,sh_normal:sh_normal,p:position",
                                "image": scene.integrator()})
@@ -72,4 +75,6 @@ def main(scene_file, path_file, frames, samples=16):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2], int(sys.argv[3]), *map(int, sys.argv[4:5]))
+    words = sys.argv[3:]
+    main(sys.argv[1], sys.argv[2], *(int(word) for word in words if "=" not in word),
+         **dict(word.split("=", 1) for word in words if "=" in word))

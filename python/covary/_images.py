@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from . import _covary
 from ._arguments import (
-    array, attribute_texts, checked, either, empty_or, flag, list_of, make_last_folder, optional, path, text,
+    array, attribute_texts, checked, either, empty_or, flag, is_elsewhere, list_of, make_last_folder, optional, path,
+    text,
 )
 from .errors import _warn
 
@@ -32,9 +33,10 @@ def read_image(path: str | PathLike[str], layer: str = "", *, accept_changed: bo
 @checked(path=path, image=array, attributes=optional(attribute_texts))
 def write_image(path: str | PathLike[str], image: Any, attributes: dict[str, str] | None = None) -> None:
     """Writes linear RGB [H, W, 3] in the format of the extension: .exr .pfm .tif .hdr .png .jpg. A file of
-    that name is replaced. Raises UsageError for other names."""
+    that name is replaced. float64 is rounded. Raises UsageError for other names."""
     make_last_folder(path)
-    _covary.write_image(fspath(path), image, attributes or {})
+    is_double = str(getattr(image, "dtype", "")) == "float64"
+    _covary.write_image(fspath(path), image.astype("float32") if is_double else image, attributes or {})
 
 
 @checked(paths=_FILES, layer=text)
@@ -54,7 +56,7 @@ def doubts_of_features(albedo: Any, normal: Any) -> list[str]:
 
     doubts = []
     for name, image, within in (("albedo", albedo, "0 and 1"), ("normal", normal, "-1 and 1")):
-        values = numpy.zeros(1) if image is None else numpy.asarray(image)
+        values = numpy.zeros(1) if image is None or is_elsewhere(image) else numpy.asarray(image)
         beyond = float(numpy.mean(numpy.abs(values) > _MUCH)) if values.dtype.kind in "fiu" else 0  # else refused later
         if beyond > _MANY:
             doubts.append(f"{name}: {beyond:.0%} of its values are far from between {within}; expected features of "

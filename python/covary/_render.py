@@ -162,12 +162,13 @@ def _check_together(given: Mapping[str, Any]) -> None:
             raise UsageError(f"found {first} and {second}; expected one of them")
 
 
-def _check_scene_arguments(scene: PathOrScene, options: Mapping[str, Any]) -> None:
-    """Raises UsageError for arguments of Scene.load() among the options."""
+def _check_scene_arguments(scene: PathOrScene, options: Mapping[str, Any], view: Mapping[str, Any]) -> None:
+    """Raises UsageError for arguments of Scene.load() among the options, with those that it shares."""
     found = sorted(set(options).intersection(Scene.load.rules))  # type: ignore[attr-defined]
     if found:
         check_some(Scene.load, options)
-        load = ", ".join([repr(getattr(scene, "path", scene)), *(f"{name}={options[name]!r}" for name in found)])
+        moved = {**{name: options[name] for name in found}, **view}
+        load = ", ".join([repr(getattr(scene, "path", scene)), *(f"{name}={value!r}" for name, value in moved.items())])
         raise UsageError(f"{', '.join(found)}: not of render(), but of Scene.load(): render(Scene.load({load}), …)")
 
 
@@ -243,16 +244,16 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     Ctrl-C ends the render within a tile; with `output` or `passes` samples are kept, and `resume=True` continues.
     """
     keywords: dict[str, Any] = dict(options)
-    _check_scene_arguments(scene, keywords)
+    view = {name: value for name, value in (("resolution", resolution), ("environment", environment),
+                                            ("background", background), ("camera", camera))
+            if value not in (None, "auto" if name == "environment" else "")}
+    _check_scene_arguments(scene, keywords, view)
     check_names(keywords, render.rules)  # type: ignore[attr-defined]
     _check_together({"resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "preview": preview,
                      "output": output, "passes": passes, "until": until, "until_p95": until_p95,
                      "until_relative": until_relative, "estimator": estimator, "denoise": denoise, "device": device,
                      **{name: keywords.get(name) for name in ("exposure", "aov_samples", "aovs", "alpha")}})
     declared = {name.replace("_", "-"): keywords.pop(name) for name in _DECLARED if name in keywords}
-    view = {name: value for name, value in (("resolution", resolution), ("environment", environment),
-                                            ("background", background), ("camera", camera))
-            if value not in (None, "auto" if name == "environment" else "")}
     texts = text_options(keywords, estimator or DEFAULT)
     _covary.check_output("" if output is None else fspath(output))
     shown = _phases(progress)

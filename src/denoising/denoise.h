@@ -73,7 +73,8 @@ DenoiserInfo denoiser_info(const DenoiseOptions& options = {});
 /// the device.
 bool runs_on_cuda(const DenoiseOptions& options);
 
-/// Path of the library that denoise() would load; "" if there is none.
+/// Path of the library that denoise() would load; "" if there is none. Throws Error(kUsage) if the environment variable
+/// COVARY_OIDN names one that is not there, and it is to be loaded.
 std::string find_denoiser(const DenoiseOptions& options = {});
 
 }  // namespace covary

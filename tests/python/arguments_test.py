@@ -26,6 +26,7 @@ NO_TEXTS = (3, "x", {"a": 1}, {1: "a"})
 NO_SCALARS = (3, "x", {"a": []}, {1: "a"}, {"a": float("nan")})
 NO_IMAGE = (3, "x", [1.0], numpy.zeros((2, 2, 3)), numpy.zeros((2, 2), numpy.float32))
 NO_GROUPS = (None, *NO_IMAGE)
+NO_PICTURE = (None, 3, "x", [1.0], numpy.zeros((2, 2, 3), numpy.int32), numpy.zeros((2, 2), numpy.float32))
 NO_SEED = (-1, 1 << 64, 0.5, *NO_NUMBERS)
 NO_SPP = (-6, 0, 48.5, (1 << 30) + 1, numpy.int64(-3), float("nan"), float("inf"), *NO_NUMBERS)
 NO_LIMIT = (-1, 0, float("nan"), float("inf"), "1", True, [1])
@@ -84,7 +85,7 @@ BAD = {
     "covary.combine": COMBINE,
     "covary.check_inputs": {"crn": without_none(NO_GROUPS), "independent": NO_GROUPS},
     "covary.read_image": {"path": (None, *NO_PATH), "layer": (None, "Albdo", *NO_TEXT), "accept_changed": NO_FLAG},
-    "covary.write_image": {"path": ("x.webp", "x", None, *NO_PATH), "image": NO_GROUPS, "attributes": NO_TEXTS},
+    "covary.write_image": {"path": ("x.webp", "x", None, *NO_PATH), "image": NO_PICTURE, "attributes": NO_TEXTS},
     "covary.read_groups": {"paths": (3, None, [], [3], "", [""]), "layer": (None, "Albdo", *NO_TEXT)},
     "covary.denoise": {"image": NO_GROUPS, "albedo": NO_IMAGE, "normal": NO_IMAGE, "oidn": ("/nowhere", *NO_TEXT)},
     "covary.Result.save": {"path": ("x.webp", "x", None, *NO_PATH), "overwrite": NO_FLAG},
