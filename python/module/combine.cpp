@@ -11,6 +11,7 @@
 #include "combine/pair_input.h"
 #include "combine/registry.h"
 #include "core/error.h"
+#include "denoising/denoise.h"
 #include "denoising/mixed_denoising.h"
 #include "denoising/render_features.h"
 #include "film/splat_layer.h"
@@ -176,7 +177,9 @@ constexpr const char* kFeatureArguments[] = {"albedo", "normal", "position", "de
 DenoisingChoice denoising_of(const std::string& estimator, const std::string& mode, const std::string& oidn) {
   OptionValues values{{"denoise", mode.empty() ? default_denoising(estimator) : mode}};
   if (!oidn.empty()) values["oidn"] = oidn;
-  return settings_from<DenoisingChoice>(values);
+  DenoisingChoice choice = settings_from<DenoisingChoice>(values);
+  if (choice.uses_oidn()) check_named_denoiser({choice.oidn});
+  return choice;
 }
 
 constexpr size_t kAll = std::numeric_limits<size_t>::max();

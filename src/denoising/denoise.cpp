@@ -225,12 +225,16 @@ void check_images(const Image& rgb, const Image* albedo, const Image* normal) {
 
 std::string find_denoiser(const DenoiseOptions& options) {
   std::string why;
-  const std::string path = open_library(options, why).path, named = environment("COVARY_OIDN");
-  if (path.empty() && options.library.empty() && !named.empty())
-    throw Error(ErrorCode::kUsage, fmt::format("the environment variable COVARY_OIDN is '{}', where Open Image Denoise "
-                                               "is not found ({}); unset it, or `oidn` off does without",
-                                               named, why));
-  return path;
+  return open_library(options, why).path;
+}
+
+void check_named_denoiser(const DenoiseOptions& options) {
+  const std::string named = environment("COVARY_OIDN");
+  if (named.empty() || !options.library.empty() || !find_denoiser(options).empty()) return;
+  throw Error(ErrorCode::kUsage,
+              fmt::format("the environment variable COVARY_OIDN is '{}', where Open Image Denoise is "
+                          "not found; unset it, or `oidn` off does without",
+                          named));
 }
 
 bool runs_on_cuda(const DenoiseOptions& options) { return load(options).has_cuda(options.cuda_device); }

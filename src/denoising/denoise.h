@@ -73,8 +73,10 @@ DenoiserInfo denoiser_info(const DenoiseOptions& options = {});
 /// the device.
 bool runs_on_cuda(const DenoiseOptions& options);
 
-/// Path of the library that denoise() would load; "" if there is none. Throws Error(kUsage) if the environment variable
-/// COVARY_OIDN names one that is not there, and it is to be loaded.
+/// Path of the library that denoise() would load; "" if there is none.
 std::string find_denoiser(const DenoiseOptions& options = {});
+/// Throws Error(kUsage) if the environment variable COVARY_OIDN names a library that is not there, and it is to be
+/// loaded: a picture would be denoised without it.
+void check_named_denoiser(const DenoiseOptions& options);
 
 }  // namespace covary

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "denoising/denoising_choice.h"
 
+#include <fmt/format.h>
+
+#include <cstdlib>
 #include <string>
 
 #include "denoising/denoise.h"
@@ -22,6 +25,11 @@ void declare(Settings& s, DenoisingChoice& v, bool is_all) {
 
 std::string missing_network(const DenoisingChoice& choice) {
   if (!choice.uses_oidn() || !choice.oidn.empty() || !find_denoiser().empty()) return "";
+  if (const char* named = std::getenv("COVARY_OIDN"); named && *named)
+    return fmt::format(
+        "the environment variable COVARY_OIDN is '{}', where Open Image Denoise is not found, so only "
+        "filters denoise the image (`oidn` off silences this note)",
+        named);
   return "Open Image Denoise is not installed, so only filters denoise the image; `pip install pyoidn` installs it "
          "(`oidn` off silences this note)";
 }
