@@ -14,7 +14,7 @@ from pathlib import Path
 
 COVARY = os.environ["COVARY"]
 SANITIZED = "SANITIZED" in os.environ
-CPU_SECONDS = 60 if SANITIZED else 2
+CPU_SECONDS = 60 if SANITIZED else 5
 MEMORY = 200e6
 
 SENSOR = """<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="16"/>
