@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Devices by CUDA, whose driver and compiler are those of cuda_stand_in.cpp. OpenCL runs the same kernels, so images
-// have the same bits.
+// Devices by CUDA, whose driver and compiler are those of cuda_stand_in.cpp.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -13,6 +12,7 @@
 #include "device/device.h"
 #include "device/kernel_source.h"
 #include "estimators/test_images.h"
+#include "gpu/comparison.h"
 #include "gpu/mixed_denoising.h"
 #include "gpu/target.h"
 #include "support/files.h"
@@ -109,23 +109,17 @@ TEST_F(Cuda, TellsItsFaults) {
   EXPECT_EQ(failure_of([] { read_from_cuda(1, 0, nullptr, 0); }).kind(), FailureKind::kLost);
 }
 
-/// The image of an estimator on a device.
-Image image_on(const std::string& device, bool is_pair) {
-  const Device opened = Device::open(device);
+/// The default's image, which launches most kinds of kernels.
+Image image_on(const std::string& device) {
   MethodSettings settings;
-  settings.crn_samples = 64;
-  const MethodTarget target = gpu::Target::open(device);
-  if (!is_pair) {
-    const test::Grouped image = test::noisy_image(kWidth, kHeight, 6, 21, 1);
-    return make_default_estimator(false, {}, {"auto", "off", {}}, target).image({{}, image.view()}, settings).estimate;
-  }
-  const test::Grouped crn = test::crn_image(kWidth, kHeight, 8, 1),
-                      independent = test::independent_image(kWidth, kHeight, 8, 2);
-  return make_estimator("iicv", {}, target).image({crn.view(), independent.view()}, settings).estimate;
+  const test::Grouped image = test::noisy_image(kWidth, kHeight, 6, 21, 1);
+  return make_default_estimator(false, {}, {"auto", "off", {}}, gpu::Target::open(device))
+      .image({{}, image.view()}, settings)
+      .estimate;
 }
 
-TEST_F(Cuda, MakesTheImagesOfOpenCl) {
-  for (const bool is_pair : {false, true}) EXPECT_EQ(image_on("cuda", is_pair).data, image_on("opencl", is_pair).data);
+TEST_F(Cuda, MakesTheImageOfTheProcessor) {
+  EXPECT_TRUE(test_support::agree(image_on("cpu").data, image_on("cuda").data));
 }
 
 /// Memory that another program has there.
