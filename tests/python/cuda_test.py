@@ -85,7 +85,8 @@ class Cuda(PackageTest):
         """To estimators on the same device, in any order in memory."""
         for images, order, options in (((None, self.independent), by_pixels, {"oidn": "off"}),
                                        ((None, self.independent), numpy.asfortranarray, {"oidn": "off"}),
-                                       ((self.crn, self.independent), numpy.asarray, {"estimator": "iduw", "samples": 24})):
+                                       ((self.crn, self.independent), numpy.asarray,
+                                        {"estimator": "iduw", "samples": 24})):
             given = [None if image is None else OnDevice(order(image)) for image in images]
             results, written = [], []
             for pair_of_images in (given, images):
