@@ -53,9 +53,10 @@ RenderOptions parsed(std::vector<std::string> words, bool of_frames) {
   try {
     command.parse(words);
   } catch (const CLI::ExtrasError&) {
-    const std::string text = unknown_argument(command, "covary render");
-    const bool is_option = text.starts_with("unknown option");
-    throw Error(ErrorCode::kUsage, is_option ? text : fmt::format("'{}' belongs to no option", options.scene));
+    const bool is_option =
+        std::ranges::any_of(command.remaining(true), [](const std::string& word) { return word.starts_with('-'); });
+    throw Error(ErrorCode::kUsage, is_option ? unknown_argument(command, "covary render")
+                                             : fmt::format("'{}' belongs to no option", options.scene));
   }
   return options;
 }
@@ -107,15 +108,19 @@ std::string read_file(const std::string& path) {
 
 void check_scenes(const lab::Suite& suite, const std::string& name, const std::string& folder) {
   std::vector<std::string> missing;
-  for (const lab::SceneEntry& scene : suite.scenes)
+  size_t n_complete = 0;
+  for (const lab::SceneEntry& scene : suite.scenes) {
+    const size_t before = missing.size();
     for (const std::string& file : lab::located(scene, folder).scene_files())
       if (!fs::exists(file)) missing.push_back(file);
+    n_complete += missing.size() == before;
+  }
   if (missing.empty()) return;
   if (!lab::builtin_suites().contains(name))
     throw Error(ErrorCode::kIo,
                 fmt::format("'{}': there {} no {}; --scenes names the folder that the suite's files are in", name,
                             missing.size() == 1 ? "is" : "are", fmt::join(missing, ", no ")));
-  if (missing.size() < suite.scenes.size()) return;  // the others can be compared
+  if (n_complete > 0) return;  // these can be compared
   throw Error(ErrorCode::kIo,
               fmt::format("'{0}' has none of the scenes of {1}; `covary scenes {1} --folder {0}` says which "
                           "are missing, and `covary scenes {1}` where they come from",

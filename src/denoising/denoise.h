@@ -34,7 +34,7 @@ class Denoiser {
   Denoiser(const Denoiser&) = delete;
   Denoiser& operator=(const Denoiser&) = delete;
 
-  /// Denoises `rgb` (linear, 3 channels, high dynamic range) . `albedo` in [0, 1] and `normal` in [-1, 1] are
+  /// Denoises `rgb` (linear, 3 channels, high dynamic range). `albedo` in [0, 1] and `normal` in [-1, 1] are
   /// features that preserve texture and edges: 3 channels, the same size, or null; the normal only together with the
   /// albedo. They may be noisy unless `clean_features` is set. Values of `rgb` that cannot be used are replaced first
   /// (filters/stray_values.h), those of features that are not finite set to zero. Throws
